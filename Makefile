@@ -1,0 +1,95 @@
+# Every target makes what it needs in $(VENV) and is quick the second time.
+PYTHON  ?= python3
+VENV    ?= .venv
+OUT     ?= out
+WORKERS ?= 2
+PYTEST_ARGS ?=
+
+BIN    := $(VENV)/bin
+PY     := $(BIN)/python
+DONE    = $(VENV)/.installed-$(1)
+FIGURES := iekf-fig2 iekf-fig3 iekf-fig4
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+PYTEST  = $(ONE_THREAD) $(PY) -m pytest -n $(WORKERS)
+BUILD  := docs/_build
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help venv reproduce test test-slow lint format notebooks notebooks-check docs docs-index bench grade clean
+
+help:
+	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
+	@echo "make test        run the tests (make test-slow: the long ones)"
+	@echo "make lint        style, types, import contracts (make format: repair the style)"
+	@echo "make notebooks   generate and execute notebooks/ from docs/chapters/"
+	@echo "make docs        build the book into $(BUILD)/html"
+	@echo "make bench       measure this machine, beside the peers that are installed"
+	@echo "make grade EXERCISE=16_name FILE=mine.py   grade an answer"
+	@echo "make clean       remove everything that was made"
+
+# --- the environment ------------------------------------------------------------------------
+
+$(PY):
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "Python 3.11 or newer is needed; name one: make PYTHON=python3.12 ..." >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+
+# One stamp per extra; a changed pyproject.toml installs again. Editable: a changed source counts at once.
+$(VENV)/.installed-%: pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable ".[$*]"
+	@touch $@
+
+venv: $(call DONE,fast)
+
+# --- what people run ------------------------------------------------------------------------
+
+reproduce: $(call DONE,fast)
+	$(BIN)/vslam-ref reproduce $(FIGURES) --out $(OUT)
+
+test: $(call DONE,fast) $(call DONE,test)
+	$(PYTEST) $(PYTEST_ARGS)
+
+test-slow: $(call DONE,fast) $(call DONE,test)
+	$(PYTEST) -m slow $(PYTEST_ARGS)
+
+bench: $(call DONE,fast) $(call DONE,test)
+	@mkdir -p $(OUT)
+	$(BIN)/vslam-ref bench filters --json $(OUT)/bench-filters.json
+
+grade: $(call DONE,fast) $(call DONE,test)
+	@test -n "$(EXERCISE)" && test -n "$(FILE)" || { echo "say: make grade EXERCISE=16_name FILE=mine.py" >&2; exit 2; }
+	$(ONE_THREAD) $(PY) docs/_tools/grade.py "$(EXERCISE)" "$(FILE)"
+
+# --- the house ------------------------------------------------------------------------------
+
+lint: $(call DONE,fast) $(call DONE,test)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+format: $(call DONE,test)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# --- the book -------------------------------------------------------------------------------
+
+notebooks: $(call DONE,fast) $(call DONE,docs)
+	$(ONE_THREAD) $(PY) docs/_tools/notebooks.py --write
+
+notebooks-check: $(call DONE,fast) $(call DONE,docs)
+	$(ONE_THREAD) $(PY) docs/_tools/notebooks.py --check --execute
+
+docs-index: $(call DONE,fast)
+	$(PY) docs/_tools/equation_index.py --write
+
+docs: $(call DONE,fast) $(call DONE,docs)
+	$(PY) docs/_tools/equation_index.py --check
+	$(PY) docs/_tools/mathjax.py $(BUILD)/mathjax
+	$(PY) docs/_tools/stage.py $(BUILD)/source
+	$(PY) -m sphinx -W --keep-going -q -E -b html $(BUILD)/source $(BUILD)/html
+	@echo "the book: $(BUILD)/html/index.html"
+
+clean:
+	rm -rf $(VENV) $(OUT) $(BUILD) dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find vslam_ref tests docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,93 @@
+"""The book's tools: equation numbers, docstring escapes, notebooks that are the same bytes every time."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PAGE = """---
+jupytext:
+  text_representation:
+    extension: .md
+    format_name: myst
+kernelspec:
+  name: python3
+  display_name: Python 3
+---
+
+# 99 · A page
+
+```{code-cell} ipython3
+:tags: [hide-input]
+import sys
+print("shown", file=sys.stdout)
+print("noise", file=sys.stderr)
+object()
+```
+"""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _tools_on_path() -> Iterator[None]:
+    sys.path.insert(0, str(ROOT / "docs" / "_tools"))
+    yield
+    sys.path.pop(0)
+
+
+def test_the_examples_of_the_sphinx_extension_hold() -> None:
+    pytest.importorskip("sphinx", reason="Sphinx comes with the docs extra")
+    result = doctest.testmod(importlib.import_module("house_sphinx"))
+    assert result.attempted >= 5
+    assert result.failed == 0
+
+
+@pytest.fixture
+def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> object:
+    """The notebook tool, working on a book of one page in a folder of its own."""
+    pytest.importorskip("jupytext", reason="jupytext comes with the docs extra")
+    pytest.importorskip("nbclient", reason="nbclient comes with the docs extra")
+    tool = importlib.import_module("notebooks")
+    (tmp_path / "chapters").mkdir()
+    (tmp_path / "chapters" / "99_page.md").write_text(PAGE, encoding="utf-8")
+    monkeypatch.setattr(tool.book, "PAGES", tmp_path / "chapters")
+    monkeypatch.setattr(tool.book, "NOTEBOOKS", tmp_path / "notebooks")
+    return tool
+
+
+def test_a_notebook_is_deterministic_tidy_and_in_step(workshop, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
+    stored = tmp_path / "notebooks" / "99_page.ipynb"
+    page = tmp_path / "chapters" / "99_page.md"
+    assert workshop.main(["--check"]) == 1  # no notebook yet
+    assert workshop.main(["--write"]) == 0
+    first = stored.read_bytes()
+    assert workshop.main(["--write"]) == 0
+    assert stored.read_bytes() == first
+    assert workshop.main(["--check"]) == 0
+
+    text = first.decode()
+    assert "shown" in text
+    assert "<object>" in text  # without its address
+    assert '"name": "stderr"' not in text  # what went there is told to the maker instead
+    assert "left out of the notebook: noise" in capsys.readouterr().err
+    assert "iopub" not in text  # no times
+    assert str(tmp_path) not in text
+
+    page.write_text(PAGE.replace('"shown"', '"changed"'), encoding="utf-8")
+    assert workshop.main(["--check"]) == 1
+    page.write_text(PAGE, encoding="utf-8")
+    (tmp_path / "notebooks" / "98_orphan.ipynb").write_bytes(first)
+    assert workshop.main(["--check"]) == 1
+
+
+def test_a_page_that_fails_is_reported(workshop, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
+    page = tmp_path / "chapters" / "99_page.md"
+    page.write_text(PAGE.replace("object()", "assert 1 + 1 == 3, 'the claim fails'"), encoding="utf-8")
+    assert workshop.main(["--check", "--execute"]) == 1
+    assert "the claim fails" in capsys.readouterr().err

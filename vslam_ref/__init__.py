@@ -1,0 +1,38 @@
+"""vslam_ref: a pure-NumPy reference implementation and executable textbook of visual SLAM.
+
+The rooms of the house stand on floors; each imports only from floors below::
+
+    6  cli, commands, experiments, bench     what a person runs
+    5  plot, datasets                        pictures; foreign formats
+    4  systems                               (later chapters)
+    3  worlds                                simulators with exact truth
+    2  filters, metrics                      estimators; how good they are
+    1  geometry                              rotations and rigid motions
+    0  _kernels                              Numba twins of hot loops
+
+The NumPy function is the text and the truth.  ``VSLAM_REF_BACKEND=auto|numpy|numba`` chooses
+whether a hot loop runs as its Numba twin.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+__version__ = "0.1.0"
+
+_ROOMS = ("geometry", "filters", "metrics", "worlds", "plot", "experiments", "testing")
+
+__all__ = ["__version__", *_ROOMS]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a room on first use, so that ``import vslam_ref`` stays as cheap as NumPy."""
+    if name in _ROOMS:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}; rooms: {', '.join(_ROOMS)}")
+
+
+def __dir__() -> list[str]:
+    """Names a reader can complete on, rooms included."""
+    return sorted(__all__)

@@ -1,0 +1,162 @@
+"""``vslam-ref reproduce``: draw a paper's figure again and judge its claims."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vslam_ref.commands.options import add_json, at_least, json_target, write_json
+
+if TYPE_CHECKING:
+    from vslam_ref.experiments.framework.claims import Claim
+    from vslam_ref.experiments.framework.experiment import Experiment, RunContext
+    from vslam_ref.experiments.framework.reproduce import Outcome
+
+HELP = "draw a paper's figure again, with a verdict on every claim"
+EPILOG = """\
+examples:
+  vslam-ref reproduce iekf-fig2 iekf-fig3
+  vslam-ref reproduce --all --quick --out quick --strict
+  vslam-ref reproduce iekf-fig2 --runs 100 --seed 7 --jobs 4 --json fig2.json
+  vslam-ref reproduce iekf-fig2 --scheduler dask --dask-address tcp://head:8786
+
+'--set' takes the keys of "config" in result.json. Options apply in the order --quick, --runs, --seed, --set.
+Exit status: 0 done, whatever the verdicts say; with --strict 1 if a claim is not reproduced; 2 bad input."""
+
+FAILED = "not reproduced"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this command."""
+    parser.add_argument("ids", nargs="*", metavar="ID", help="experiments; see 'vslam-ref list'")
+    parser.add_argument("--all", action="store_true", help="every experiment")
+    parser.add_argument("--out", default="out", metavar="DIR", help="where results go (default: %(default)s)")
+    parser.add_argument("--quick", action="store_true", help="a small version that takes seconds")
+    parser.add_argument(
+        "--runs",
+        type=at_least(2),
+        metavar="N",
+        help="Monte Carlo runs in the judged sample; a population behind it is scaled in proportion",
+    )
+    parser.add_argument("--seed", type=at_least(0), metavar="N", help="root of all randomness")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting; may be repeated"
+    )
+    parser.add_argument("--jobs", type=at_least(1), metavar="N", help="worker processes (default: all cores)")
+    parser.add_argument(
+        "--scheduler", choices=["local", "dask"], default="local", help="default: %(default)s"
+    )
+    parser.add_argument("--dask-address", metavar="URL", help="tcp://host:port of a running Dask scheduler")
+    parser.add_argument("--strict", action="store_true", help="exit status 1 if a claim is not reproduced")
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check everything, then run the experiments one after the other."""
+    from vslam_ref.experiments.framework import files
+    from vslam_ref.experiments.framework import reproduce as framework
+
+    work = _work(options)
+    context = _context(options)
+    target = json_target(options)
+    out = files.require_folder(options.out)
+
+    outcomes = []
+    for number, (experiment, config) in enumerate(work, 1):
+        print(f"[{number}/{len(work)}] {experiment.id}: {experiment.title}", file=sys.stderr, flush=True)
+        for outcome in framework.reproduce([(experiment, config)], context, out):
+            _print_outcome(outcome)
+            outcomes.append(outcome)
+    verdicts = [claim.verdict for outcome in outcomes for claim in outcome.claims]
+    _print_summary(verdicts, out)
+    write_json(target, _numbers(outcomes, out))
+    return 1 if options.strict and FAILED in verdicts else 0
+
+
+def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
+    """Return each experiment with its config; ``InputError`` before anything has run."""
+    from vslam_ref.experiments.framework.errors import InputError
+    from vslam_ref.experiments.framework.registry import load, summaries
+
+    if options.all == bool(options.ids):
+        raise InputError(
+            "give the ids of experiments or --all, one of the two; 'vslam-ref list' shows the ids"
+        )
+    ids = [s.id for s in summaries()] if options.all else list(dict.fromkeys(options.ids))
+    experiments = [load(id) for id in ids]
+    return [(experiment, _configure(experiment, options)) for experiment in experiments]
+
+
+def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:
+    """Apply the options; with ``--all``, an experiment without runs or seed ignores these two."""
+    from vslam_ref.experiments.framework.config import find_setting
+
+    default = experiment.default()
+    runs, seed = options.runs, options.seed
+    if options.all:
+        runs = runs if find_setting(default, "runs") else None
+        seed = seed if find_setting(default, "seed") else None
+    return experiment.configure(quick=options.quick, runs=runs, seed=seed, overrides=options.set)
+
+
+def _context(options: argparse.Namespace) -> RunContext:
+    from vslam_ref.experiments.framework.experiment import RunContext
+    from vslam_ref.experiments.framework.scheduler import check_scheduler, dask_client
+
+    jobs = options.jobs or _cores()
+    check_scheduler(options.scheduler, options.dask_address, jobs)
+    if options.scheduler == "dask":
+        with dask_client(options.dask_address):
+            pass  # a cluster that cannot be reached is told now, not after the first experiment
+    return RunContext(jobs, options.scheduler, options.dask_address, progress=True)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _print_outcome(outcome: Outcome) -> None:
+    from vslam_ref.experiments.framework.claims import WORST_FIRST
+
+    for claim in sorted(outcome.claims, key=lambda c: WORST_FIRST.index(c.verdict)):
+        print(_claim_line(outcome.experiment.id, claim))
+    print(f"{outcome.experiment.id}: {outcome.seconds:.1f} s, files in {outcome.folder}", flush=True)
+
+
+def _claim_line(experiment: str, claim: Claim) -> str:
+    share = "share  -  " if claim.share is None else f"share {claim.share:.3f}"
+    text = textwrap.shorten(claim.text, 80, placeholder=" ...")
+    return f"{claim.verdict:<14}  {experiment}/{claim.id}  {share}  {text}"
+
+
+def _print_summary(verdicts: Sequence[str], out: Path) -> None:
+    from vslam_ref.experiments.framework.claims import VERDICTS
+
+    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in VERDICTS)
+    print(f"{len(verdicts)} claims: {counts}; open {out / 'index.html'}", flush=True)
+
+
+def _numbers(outcomes: Sequence[Outcome], out: Path) -> dict[str, Any]:
+    """Return what was printed, as ``--json`` writes it."""
+    return {
+        "out": str(out),
+        "experiments": [
+            {
+                "experiment": o.experiment.id,
+                "seed": o.seed,
+                "runs": o.runs,
+                "seconds": o.seconds,
+                "folder": str(o.folder),
+                "claims": [claim.to_dict() for claim in o.claims],
+            }
+            for o in outcomes
+        ],
+    }

@@ -1,0 +1,28 @@
+"""Bad input, told in one line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """What the user gave cannot be used.
+
+    The message is one line: what is wrong, where, and what would be right.  The command line prints
+    it without a traceback and ends with status 2.
+    """
+
+
+def suggestion(word: str, valid: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the nearest valid word, or an empty string.
+
+    Examples
+    --------
+    >>> suggestion("iekf-fig22", ["iekf-fig2", "other"])
+    " (did you mean 'iekf-fig2'?)"
+    >>> suggestion("zzz", ["iekf-fig2"])
+    ''
+    """
+    near = difflib.get_close_matches(word, list(valid), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""

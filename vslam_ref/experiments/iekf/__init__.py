@@ -1,0 +1,28 @@
+"""The claims of B 4.1 about figures 2, 3 and 4, and the rules that judge them.
+
+============================  =====================================================================
+module                        holds
+============================  =====================================================================
+``sentences``                 every statement of B 4.1 with its rule: the table fixed before the runs
+``rules``                     the vocabulary: windows, statistics of mean curves, sizes of effect words
+``naive``                     the sentences read pointwise, reported beside the rules
+``worlds``                    draws of runs, and worlds in which a claim is false
+``evaluate``                  thresholds, shares, intervals and null rates of many claims in one pass
+``judge``                     the verdict rule, and the door: per-run arrays in, claims out
+============================  =====================================================================
+"""
+
+from vslam_ref.experiments.iekf.judge import StudyArrays, all_at_once, conclude, evaluate, judge
+from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence, claim_ids, rules_table
+
+__all__ = [
+    "SENTENCES",
+    "Sentence",
+    "StudyArrays",
+    "all_at_once",
+    "claim_ids",
+    "conclude",
+    "evaluate",
+    "judge",
+    "rules_table",
+]

@@ -1,0 +1,14 @@
+"""Floor 2: vehicle models and the filters that estimate a pose and a map of landmarks.
+
+============================  =====================================================================
+module                        holds
+============================  =====================================================================
+``vehicle``                   motion models (B4 and its alternative), increments and their noise
+``observation``               a landmark seen from the vehicle (B20, B21) and its inverse (B23-B25)
+``block_covariance``          the covariance in pose and map blocks, and its measurement update
+``ekf_slam``                  EKF-SLAM, the anchored EKF and the ideal EKF
+``carleman_ekf``              the *improved* EKF of seed B: a second-order Carleman lift.  It is
+                              neither the invariant nor the iterated EKF
+``observability``             the nullity of the linearised system along a run
+============================  =====================================================================
+"""

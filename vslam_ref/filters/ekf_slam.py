@@ -1,0 +1,238 @@
+"""EKF-SLAM for a planar vehicle, and two controls that tell what its inconsistency comes from.
+
+::
+
+    increment ----> predict:  F, G at the estimate, P <- F P F^T + G Q G^T       O(n)
+    z of known  --> update:   innovation = z - h(x),  K = P H^T S^-1             O(k n^2)
+    z of new    --> augment:  landmark g(x, z), with all its cross covariances   O(k n)
+
+* :class:`EkfSlam`, the textbook filter: state (x, y, theta) and (x_i, y_i) per landmark, world frame.
+* :class:`AnchoredEkf`: the same filter started at zero covariance in its own start frame; the
+  uncertain start N(x0, P0) is composed with its output.  P0, which no relative measurement can
+  reduce, never meets a measurement.
+* ``EkfSlam(..., truth=...)``, the *ideal* EKF: Jacobians at the true state.  No real filter can
+  have them; it is a control.
+
+All runs of a batch share the landmark schedule; each has its own noises.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.filters import observation, vehicle
+from vslam_ref.filters.block_covariance import Blocks, landmark_update
+from vslam_ref.filters.estimates import (
+    Innovation,
+    MapEstimate,
+    PoseEstimate,
+    as_batch,
+    checked_measurement,
+    diagonal_blocks,
+)
+from vslam_ref.geometry import se2, so2
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class Truth(NamedTuple):
+    """True poses (T + 1, 3) and landmarks by identity (n, 2), for the ideal EKF only."""
+
+    poses: Array
+    landmarks: Array
+
+
+@accelerated("slam:ekf_predict")
+def ekf_predict(x_p: Array, P_pp: Array, P_pm: Array, at: Array, ds: Array, dalpha: Array, cov: Array) -> None:
+    """One prediction, in place: pose mean, P_pp <- F P_pp F^T + G Q G^T and P_pm <- F P_pm.
+
+    Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): rows
+    and columns 0 and 1 gain a multiple of row and column 2, and nothing else moves.
+
+    Parameters
+    ----------
+    x_p, P_pp, P_pm : ndarray, shapes (B, 3), (B, 3, 3), (B, 3, M)
+        Changed in place.
+    at : ndarray, shape (B, 2)
+        Heading and distance at which F and G are taken: the estimate and ds, or the truth for the ideal
+        EKF.
+    ds, dalpha, cov : ndarray, shapes (B,), (B,), (B, 2, 2)
+        The increment.
+    """
+    pose, increment = np.zeros((len(at), 3)), np.zeros((len(at), 2))
+    pose[:, 2], increment[:, 0] = at.T
+    _, J_pose, J_inc = vehicle.propagate_with_jacobians(pose, increment)
+    x_p[:, 0] += ds * np.cos(x_p[:, 2])
+    x_p[:, 1] += ds * np.sin(x_p[:, 2])
+    x_p[:, 2] = so2.wrap(x_p[:, 2] + dalpha)
+    P_pp[:] = J_pose @ P_pp @ J_pose.swapaxes(1, 2) + J_inc @ cov @ J_inc.swapaxes(1, 2)
+    P_pm[:, :2] += J_pose[:, :2, 2:] * P_pm[:, 2:]
+
+
+class EkfSlam:
+    """EKF-SLAM for a batch of runs.
+
+    Parameters
+    ----------
+    mean : array_like, shape (3,) or (B, 3)
+        Start pose (x, y, theta), metres and radians, world frame.
+    cov : array_like, shape (3, 3) or (B, 3, 3)
+        Its covariance; a given value, zero allowed.
+    capacity : int
+        Landmarks to make room for (the map grows beyond it when it must).
+    truth : Truth, optional
+        Take every Jacobian at this truth instead of the estimate: the ideal EKF.
+    """
+
+    def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32, truth: Truth | None = None) -> None:
+        x, P = as_batch(mean, cov)
+        self.blocks = Blocks(x, P, landmark_states=2, capacity=capacity)
+        self._truth = truth
+        self._step = 0
+
+    def _linearisation(self) -> Array:
+        """Pose (B, 3) at which Jacobians are taken."""
+        if self._truth is None:
+            return self.blocks.x_p
+        return np.broadcast_to(self._truth.poses[self._step], self.blocks.x_p.shape)
+
+    def predict(self, increment: vehicle.Increment) -> None:
+        """Move the pose by an increment; the map stays. Implements :eq:`eq-b4` (B4)."""
+        b = self.blocks
+        at = np.stack([self._linearisation()[:, 2], self._distance(increment)], 1)
+        ekf_predict(b.x_p, b.P_pp, b.P_pm, at, *increment)
+        self._step += 1
+
+    def _distance(self, increment: vehicle.Increment) -> Array:
+        """Distance (B,) at which F is taken: measured, or true for the ideal EKF.
+
+        With true headings and *measured* distances F would not carry the unobservable rotation from
+        one true pose to the next, and the control would gain heading information from nothing.
+        """
+        if self._truth is None:
+            return increment.ds
+        here, there = self._truth.poses[self._step], self._truth.poses[self._step + 1]
+        ahead = np.array([np.cos(here[2]), np.sin(here[2])])
+        return np.full(len(increment.ds), (there - here)[:2] @ ahead)
+
+    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
+        """Update with landmarks already in the map, then add those seen for the first time.
+
+        Parameters
+        ----------
+        ids : array_like of int, shape (m,)
+            Identities (known association), each once.
+        z : array_like, shape (B, m, 2)
+            Relative Cartesian measurements, metres, vehicle frame.
+        cov_z : array_like, shape (2, 2) or (m, 2, 2)
+            Their covariance.
+
+        Returns
+        -------
+        Innovation or None
+            None when no landmark was known before.
+        """
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self.blocks.x_p))
+        known, new = self.blocks.split(ids)
+        seen = self._update_known(ids[known], z[:, known], cov_z[known]) if len(known) else None
+        if len(new):
+            self._augment(ids[new], z[:, new], cov_z[new])
+        return seen
+
+    def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
+        b = self.blocks
+        columns = b.columns(ids)
+        landmarks = b.x_m.reshape(len(b.x_p), -1, 2)[:, columns // 2]
+        predicted = observation.vehicle_from_world_with_jacobians(b.x_p[:, None], landmarks)
+        innovation = (z - predicted.value).reshape(len(z), -1)
+        H = predicted
+        if self._truth is not None:
+            H = observation.vehicle_from_world_with_jacobians(
+                self._linearisation()[:, None], self._truth.landmarks[None, ids]
+            )
+        S = landmark_update(
+            b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z
+        )
+        b.x_p[:, 2] = so2.wrap(b.x_p[:, 2])
+        return Innovation(innovation, S)
+
+    def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
+        """Add landmarks with their cross covariances; all pairs of new ones share the pose error."""
+        b = self.blocks
+        B, m = z.shape[:2]
+        mean = observation.world_from_vehicle(b.x_p[:, None], z)
+        J = observation.world_from_vehicle_with_jacobians(self._linearisation()[:, None], self._placed_at(ids, z))
+        G = J.J_pose.reshape(B, 2 * m, 3)
+        cov = G @ b.P_pp @ G.swapaxes(1, 2)
+        noise = J.J_measurement @ cov_z @ J.J_measurement.swapaxes(2, 3)
+        for j in range(m):
+            cov[:, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += noise[:, j]
+        cross_pose = b.P_pp @ G.swapaxes(1, 2)
+        cross_map = b.P_pm.swapaxes(1, 2) @ G.swapaxes(1, 2)
+        b.append(ids, mean.reshape(B, -1), cov, cross_pose, cross_map)
+
+    def _placed_at(self, ids: IntArray, z: Array) -> Array:
+        """Relative landmark at which the placement is linearised: measured, or true for the ideal EKF."""
+        if self._truth is None:
+            return z
+        return observation.vehicle_from_world(self._linearisation()[:, None], self._truth.landmarks[None, ids])
+
+    def pose(self) -> PoseEstimate:
+        """Pose mean (B, 3) and covariance (B, 3, 3), copies."""
+        return PoseEstimate(self.blocks.x_p.copy(), self.blocks.P_pp.copy())
+
+    def landmarks(self) -> MapEstimate:
+        """The map in the world frame, copies."""
+        b = self.blocks
+        return MapEstimate(b.ids, b.x_m.reshape(len(b.x_p), -1, 2).copy(), diagonal_blocks(b.P_mm, 2, 2))
+
+
+class AnchoredEkf:
+    """EKF-SLAM anchored in its start frame: the uncertain start is composed with the output.
+
+    Parameters
+    ----------
+    mean, cov, capacity
+        As for :class:`EkfSlam`.
+
+    Notes
+    -----
+    Inside runs an ordinary :class:`EkfSlam` from the zero pose with zero covariance.  Its estimate of
+    the motion since the start is independent of the start error, so the pose in the world is
+    T_world_start T_start_vehicle with both factors' first-order covariances added.
+    """
+
+    def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32) -> None:
+        self._start = PoseEstimate(*as_batch(mean, cov))
+        self.local = EkfSlam(np.zeros_like(self._start.mean), np.zeros((3, 3)), capacity)
+
+    def predict(self, increment: vehicle.Increment) -> None:
+        """As :meth:`EkfSlam.predict`, in the start frame."""
+        self.local.predict(increment)
+
+    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
+        """As :meth:`EkfSlam.update`, in the start frame."""
+        return self.local.update(ids, z, cov_z)
+
+    def pose(self) -> PoseEstimate:
+        """Pose in the world: N(x0, P0) composed with the local estimate, first order."""
+        start, local = self._start, self.local.pose()
+        at = observation.world_from_vehicle_with_jacobians(start.mean, local.mean[:, :2])
+        J_start, J_local = np.zeros_like(start.cov), np.zeros_like(start.cov)
+        J_start[:, :2], J_start[:, 2, 2] = at.J_pose, 1.0
+        J_local[:, :2, :2], J_local[:, 2, 2] = at.J_measurement, 1.0
+        cov = J_start @ start.cov @ J_start.swapaxes(1, 2) + J_local @ local.cov @ J_local.swapaxes(1, 2)
+        return PoseEstimate(se2.compose(start.mean, local.mean), cov)
+
+    def landmarks(self) -> MapEstimate:
+        """The map in the world frame, the start's uncertainty composed to first order."""
+        start, local = self._start, self.local.landmarks()
+        at = observation.world_from_vehicle_with_jacobians(start.mean[:, None], local.mean)
+        cov = at.J_pose @ start.cov[:, None] @ at.J_pose.swapaxes(2, 3)
+        cov += at.J_measurement @ local.cov @ at.J_measurement.swapaxes(2, 3)
+        return MapEstimate(local.ids, at.value, cov)

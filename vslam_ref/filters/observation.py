@@ -1,0 +1,94 @@
+"""A landmark seen from the vehicle, and a landmark placed from what was seen.
+
+The measurement is *relative Cartesian*: the landmark's coordinates in the vehicle frame, metres, x
+ahead and y to the left.  The paper calls it the landmark in global coordinates (B20), an erratum.
+innovation = measured - predicted.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref.geometry import se2, so2
+
+Array = NDArray[np.float64]
+
+
+class ObservationJacobians(NamedTuple):
+    """Value (..., 2) and Jacobians in the pose (..., 2, 3) and in the landmark (..., 2, 2)."""
+
+    value: Array
+    J_pose: Array
+    J_landmark: Array
+
+
+class PlacementJacobians(NamedTuple):
+    """Value (..., 2) and Jacobians in the pose (..., 2, 3) and in the measurement (..., 2, 2)."""
+
+    value: Array
+    J_pose: Array
+    J_measurement: Array
+
+
+def vehicle_from_world(pose: ArrayLike, landmark: ArrayLike) -> Array:
+    """Landmark in the vehicle frame, R(theta)^T (landmark - position).
+
+    Implements :eq:`eq-b21` (B21).
+
+    Parameters
+    ----------
+    pose : array_like, shape (..., 3)
+        Vehicle pose (x, y, theta) in the world, metres and radians.
+    landmark : array_like, shape (..., 2)
+        World coordinates, metres.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Vehicle coordinates, metres.
+    """
+    return se2.act(se2.inverse(pose), landmark)
+
+
+def vehicle_from_world_with_jacobians(pose: ArrayLike, landmark: ArrayLike) -> ObservationJacobians:
+    """:func:`vehicle_from_world` and its Jacobians; same parameters."""
+    pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
+    d = landmark - pose[..., :2]
+    theta = np.broadcast_to(pose[..., 2], d.shape[:-1])
+    c, s = np.cos(theta), np.sin(theta)
+    value = np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0]], -1)
+    J_landmark = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
+    J_theta = np.stack([value[..., 1], -value[..., 0]], -1)
+    J_pose = np.concatenate([-J_landmark, J_theta[..., None]], -1)
+    return ObservationJacobians(value, J_pose, J_landmark)
+
+
+def world_from_vehicle(pose: ArrayLike, measurement: ArrayLike) -> Array:
+    """World coordinates of a landmark measured in the vehicle frame.
+
+    Implements :eq:`eq-b25` (B25), the composition of B23 and B24.
+
+    Parameters
+    ----------
+    pose : array_like, shape (..., 3)
+        Vehicle pose in the world.
+    measurement : array_like, shape (..., 2)
+        Vehicle coordinates of the landmark, metres.
+    """
+    return se2.act(pose, measurement)
+
+
+def world_from_vehicle_with_jacobians(pose: ArrayLike, measurement: ArrayLike) -> PlacementJacobians:
+    """:func:`world_from_vehicle` and its Jacobians; same parameters."""
+    pose, z = np.asarray(pose, dtype=np.float64), np.asarray(measurement, dtype=np.float64)
+    J_z = np.broadcast_to(so2.exp(pose[..., 2]), (*np.broadcast_shapes(pose.shape[:-1], z.shape[:-1]), 2, 2))
+    turned = np.einsum("...ij,...j->...i", J_z, z)
+    value = turned + pose[..., :2]
+    J_pose = np.zeros((*value.shape[:-1], 2, 3))
+    J_pose[..., 0, 0] = J_pose[..., 1, 1] = 1.0
+    J_pose[..., 0, 2] = -turned[..., 1]
+    J_pose[..., 1, 2] = turned[..., 0]
+    return PlacementJacobians(value, J_pose, J_z)

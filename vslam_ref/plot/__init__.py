@@ -1,0 +1,13 @@
+"""Floor 5: pictures.  The only room that imports matplotlib.
+
+============================  =====================================================================
+module                        holds
+============================  =====================================================================
+``style``                     colours, line styles and names of filters; figures without global state
+``consistency``               mean NEES and mean error over Monte Carlo runs (B's figures 2-4)
+``plane``                     vehicles, landmarks and covariance ellipses
+``saving``                    figures as files, the same bytes every time
+============================  =====================================================================
+
+Functions return a :class:`matplotlib.figure.Figure` that belongs to no window and no global list.
+"""
