@@ -87,7 +87,8 @@ docs: $(call DONE,fast) $(call DONE,docs)
 	$(PY) docs/_tools/equation_index.py --check
 	$(PY) docs/_tools/mathjax.py $(BUILD)/mathjax
 	$(PY) docs/_tools/stage.py $(BUILD)/source
-	$(PY) -m sphinx -W --keep-going -q -E -b html $(BUILD)/source $(BUILD)/html
+	rm -rf $(BUILD)/html
+	$(PY) -m sphinx -W --keep-going -q -E -b html -d $(BUILD)/doctrees $(BUILD)/source $(BUILD)/html
 	@echo "the book: $(BUILD)/html/index.html"
 
 clean:

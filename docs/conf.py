@@ -45,6 +45,7 @@ napoleon_use_ivar = True  # a dataclass documents its fields once
 
 suppress_warnings = [
     "myst.mathjax",
+    "myst-nb.lexer",  # a page without its notebook, of which docs/_tools/stage.py warns
     "ref.python",  # a word of a docstring's type line that is the name of several fields
 ]
 if not book.pages():  # nothing to cite yet: the first page makes every missing label an error

@@ -27,11 +27,13 @@ from typing import NoReturn
 import vslam_ref
 from vslam_ref.commands import bench, data, reproduce, warm_cache
 from vslam_ref.commands import list as list_command
+from vslam_ref.commands import run as run_command
 
 PROGRAM = "vslam-ref"
 COMMANDS: dict[str, ModuleType] = {
     "list": list_command,
     "reproduce": reproduce,
+    "run": run_command,
     "data": data,
     "bench": bench,
     "warm-cache": warm_cache,

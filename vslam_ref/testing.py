@@ -89,7 +89,8 @@ def check_jacobian(
 
     *Central differences:* D(h), D(h/2) and D(h/4), extrapolated twice, are exact up to h^6.  The
     tolerance is what the last extrapolation changed, which is larger than the error left, plus the
-    rounding of the function values over the smallest step, 4 ``roundings`` eps max|f| / h.
+    rounding of the function values over the smallest step, 4 ``roundings`` eps (max|f| + max |J| |x|) / h: a
+    sound evaluation is exact for an argument that is off by some eps.
 
     Examples
     --------
@@ -149,10 +150,10 @@ def _central(
 ) -> Derivative:
     """Numeric Jacobian by central differences at h, h/2, h/4, extrapolated twice, and its tolerance."""
     subtract = difference if difference is not None else np.subtract
-    columns, tolerances = [], []
-    for j in range(len(x)):
-        h = _STEP * max(1.0, abs(x[j]))
-        slopes, size = [], 0.0
+    steps = _STEP * np.maximum(1.0, np.abs(x))
+    columns, truncation, size = [], [], 0.0
+    for j, h in enumerate(steps):
+        slopes = []
         for step in (h, h / 2, h / 4):
             ahead, behind = x.copy(), x.copy()
             ahead[j] += step
@@ -161,10 +162,11 @@ def _central(
             size = max(size, np.abs(f_ahead).max(), np.abs(f_behind).max())
             slopes.append(subtract(f_ahead, f_behind) / (ahead[j] - behind[j]))
         once = [(4 * slopes[1] - slopes[0]) / 3, (4 * slopes[2] - slopes[1]) / 3]
-        twice = (16 * once[1] - once[0]) / 15
-        columns.append(twice)
-        tolerances.append(np.abs(twice - once[1]) + 4 * roundings * EPS * size / h)
-    return np.stack(columns, -1), np.stack(tolerances, -1), "central"
+        columns.append((16 * once[1] - once[0]) / 15)
+        truncation.append(np.abs(columns[-1] - once[1]))
+    numeric = np.stack(columns, -1)
+    size += float((np.abs(numeric) @ np.abs(x)).max())
+    return numeric, np.stack(truncation, -1) + 4 * roundings * EPS * size / steps, "central"
 
 
 class ConsistencyCheck(NamedTuple):

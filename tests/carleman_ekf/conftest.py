@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from vslam_ref.filters import observation, vehicle
-from vslam_ref.geometry import so2
+from vslam_ref.geometry import se2, so2
+from vslam_ref.worlds import vehicle_field
 
 
 class Step(NamedTuple):
@@ -193,5 +194,51 @@ def literal() -> Callable[..., LiteralFilter]:
     def build(z: np.ndarray, P: np.ndarray, control: Any, keep_w: bool = True) -> LiteralFilter:
         T = reduction_of_vehicle()
         return LiteralFilter(T @ z, T @ P @ T.T, kinds.get(control, control), keep_w)
+
+    return build
+
+
+class Field(NamedTuple):
+    """The standard field of seed B for a few runs: what a filter is fed, and the truth."""
+
+    truth: np.ndarray  # (T + 1, 3)
+    increments: list[vehicle.Increment]
+    sightings: dict[int, tuple[np.ndarray, np.ndarray]]  # step -> ids, z
+    cov_z: np.ndarray
+    start: np.ndarray  # (B, 3), standard normal
+
+    def run(self, make: Callable[[np.ndarray, np.ndarray], Any], P0: tuple[float, ...], look: Any) -> None:
+        """Build a filter from a drawn start and its P0; call ``look(slam, step, what)`` after everything."""
+        slam = make(self.truth[0] + self.start * np.sqrt(P0), np.diag(P0))
+        for k in range(len(self.truth)):
+            if k:
+                slam.predict(self.increments[k - 1])
+                look(slam, k, "predicted")
+            if k in self.sightings:
+                ids, z = self.sightings[k]
+                slam.update(ids, z, self.cov_z)
+                look(slam, k, "updated")
+
+
+@pytest.fixture(scope="session")
+def field() -> Callable[..., Field]:
+    """Build the standard field for a number of laps and runs, turned as a whole about the origin."""
+
+    def build(laps: int, runs: int, turn: float = 0.0) -> Field:
+        config = vehicle_field.VehicleFieldConfig(laps=laps)
+        world = vehicle_field.make_field(config, np.random.default_rng(0))
+        noise = vehicle_field.draw_noise(world, [np.random.default_rng(i) for i in range(runs)])
+        u = world.controls + noise.controls * np.array([config.sigma_v, config.sigma_phi])
+        steps = [
+            vehicle.ackermann_increment(u[:, k], config.cov_u, config.wheelbase, config.dt)
+            for k in range(config.steps)
+        ]
+        seen = {
+            s.step: (s.ids, s.z + config.sigma_z * e)
+            for s, e in zip(world.sightings, noise.sightings, strict=True)
+        }
+        truth = se2.compose([0.0, 0.0, turn], world.poses)
+        start = np.concatenate([so2.act(turn, noise.start[:, :2]), noise.start[:, 2:]], 1)
+        return Field(truth, steps, seen, config.cov_z, start)
 
     return build

@@ -26,7 +26,7 @@ PROBE = """<script>window.addEventListener("load", () => setTimeout(() => {
   const red = 'mjx-merror, [data-mml-node="merror"], mjx-container [stroke="red"]';
   const report = {
     broken: [...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.getAttribute("src")),
-    formulas: document.querySelectorAll("mjx-container svg").length,
+    formulas: document.querySelectorAll("mjx-container").length,
     sources: document.querySelectorAll(".math").length,
     errors: [...document.querySelectorAll(red)].map(e => e.outerHTML.slice(0, 200)),
     outside: performance.getEntriesByType("resource").map(e => e.name)

@@ -21,9 +21,14 @@ from vslam_ref.experiments.framework.results import to_json
 def cluster() -> Iterator[str]:
     """A Dask cluster of two processes on this machine; gives its address."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=2, processes=True, dashboard_address=None
-    ) as local:
+    dask = pytest.importorskip("dask")
+    two = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), 2)
+    with (
+        dask.config.set({"distributed.nanny.pre-spawn-environ": two}),  # not Dask's own 1: we must limit it
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=2, processes=True, dashboard_address=None
+        ) as local,
+    ):
         yield local.scheduler_address
 
 
@@ -66,7 +71,7 @@ def test_one_job_stays_here_with_one_inner_thread_and_restores_the_rest():
 def test_workers_use_the_backend_of_the_caller(cluster):
     with _kernels.use_backend("numpy"):
         for where in ({"jobs": 1}, {"jobs": 2}, {"scheduler": "dask", "dask_address": cluster}):
-            assert {name for _, _, name in run_batches(worker_threads, range(4), **where)} == {"numpy"}
+            assert {name for _, _, name in run_batches(worker_threads, range(40), **where)} == {"numpy"}
 
 
 def test_no_batches_give_no_results():

@@ -60,6 +60,21 @@ def test_texts_of_experiments_are_shown_as_text(out):
     assert "<b>any</b> & all" in shown.text
 
 
+def test_no_text_of_a_result_file_becomes_markup():
+    evil = '"><u>&'
+    claim = dict.fromkeys(("id", "source", "text", "rule", "ci", "null_rate", "share", "verdict"), evil)
+    setting = dict.fromkeys(("key", "value", "default", "unit", "reason"), evil)
+    result = {
+        **dict.fromkeys(("folder", "title", "source", "seed", "runs", "seconds"), evil),
+        "claims": [{**claim, "measured": {evil: evil}}],
+        "assumptions": [setting, {**setting, "default": "another"}],
+        "versions": {evil: evil},
+    }
+    for text in (report.page([result]), report.page([{"folder": evil, "error": evil, "claims": []}])):
+        assert "<u>" not in text
+        assert evil in Page(text).text
+
+
 def test_nothing_is_requested_but_the_files_beside_the_page(out):
     addresses = page(out).addresses
     beside = [a for a in addresses if not a.startswith(("#", "data:"))]

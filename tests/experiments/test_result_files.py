@@ -139,6 +139,23 @@ def test_a_figure_that_cannot_be_written_leaves_the_previous_result_whole(tmp_pa
     assert {name: (folder / name).read_bytes() for name in FILES} == before
 
 
+def test_a_rename_that_fails_puts_the_previous_result_back(tmp_path, monkeypatch):
+    folder = make(tmp_path)
+    before = {name: (folder / name).read_bytes() for name in FILES}
+    rename = Path.rename
+
+    def refuse(self, target):
+        if ".tmp-" in self.name:
+            raise PermissionError(13, "Permission denied")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", refuse)
+    with pytest.raises(PermissionError):
+        make(tmp_path, seed=9)
+    assert names(tmp_path) == {"toy", "index.html"}
+    assert {name: (folder / name).read_bytes() for name in FILES} == before
+
+
 def test_a_new_result_replaces_the_old_one(tmp_path):
     make(tmp_path)
     content = json.loads((make(tmp_path, seed=9) / "result.json").read_text())

@@ -60,6 +60,7 @@ def worker_threads(_: int) -> tuple[int, int, str]:
 
     from vslam_ref import _kernels
 
+    time.sleep(0.01)  # so that threads of one worker overlap
     return os.getpid(), max((p["num_threads"] for p in threadpool_info()), default=1), _kernels.backend()
 
 

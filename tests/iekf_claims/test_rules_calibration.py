@@ -90,7 +90,7 @@ def test_windows_are_the_ones_in_the_text():
     }
     expected = {
         "lap 1": (0, 79.9, 800), "lap 2": (80, 160, 801), "both laps": (0, 160, 1601),
-        "before closure": (70, 79.9, 100), "after closure": (80, 89.9, 100),
+        "before closure": (60, 69.9, 100), "after closure": (80, 89.9, 100),
         "closure": (75, 84.9, 100), "end": (150, 160, 101),
     }  # fmt: skip
     for name, span in expected.items():

@@ -164,7 +164,7 @@ def landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H_p, H_l, columns, innovation, c
 
 @_kernel(_changed(2), _changed(3), _changed(3), _given(2), _given(1), _given(1), _given(3))
 def ekf_predict(x_p, P_pp, P_pm, at, ds, dalpha, cov):
-    """Twin of :func:`vslam_ref.filters.ekf_slam.ekf_predict`."""
+    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_predict`."""
     M = P_pm.shape[2]
     for b in range(x_p.shape[0]):
         c, s, d = np.cos(at[b, 0]), np.sin(at[b, 0]), at[b, 1]
@@ -241,6 +241,43 @@ def reduced_predict(x_p, P_a, frame, control, cov):
         frame[b, 3] *= complex(m.real, -m.imag)
 
 
+@_kernel(_changed(2), _changed(3), _changed(2, types.complex128), _given(1), _given(1), _given(3))
+def reduced_predict_first_order(x_p, P_a, frame, ds, dalpha, cov):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced.reduced_predict_first_order`.
+
+    Written out for noise in (ds, dalpha) only: it moves (x, y) along the old heading, (sin, cos) along the
+    tangent, A by -i dalpha and g by -dds / c_old + i (m tau + t) dalpha / c_new.
+    """
+    G = np.zeros((8, 2))
+    G[5, 1] = -1.0
+    for b in range(x_p.shape[0]):
+        d, m = ds[b], complex(np.cos(dalpha[b]), -np.sin(dalpha[b]))
+        c_old = frame[b, 0]
+        c_new, tau = m * c_old, m * frame[b, 1] + d * m
+        along, turn = -1.0 / c_old, 1j * tau / c_new
+        G[0, 0], G[1, 0] = x_p[b, 3], x_p[b, 2]
+        P = P_a[b]
+        _step_rows(x_p[b], d, m)
+        for j in range(8):
+            _step_rows(P[:, j], d, m)
+        for i in range(8):
+            _step_rows(P[i], d, m)
+        G[2, 1], G[3, 1] = x_p[b, 3], -x_p[b, 2]
+        G[6, 0], G[7, 0], G[6, 1], G[7, 1] = along.real, along.imag, turn.real, turn.imag
+        q00, q01, q10, q11 = cov[b, 0, 0], cov[b, 0, 1], cov[b, 1, 0], cov[b, 1, 1]
+        for i in range(8):
+            u, v = G[i, 0] * q00 + G[i, 1] * q10, G[i, 0] * q01 + G[i, 1] * q11
+            for j in range(i + 1):
+                w = u * G[j, 0] + v * G[j, 1]
+                P[i, j] += w
+                if j < i:
+                    P[j, i] += w
+        frame[b, 0] = c_new
+        frame[b, 1] = tau
+        frame[b, 2] += d * frame[b, 3]
+        frame[b, 3] *= complex(m.real, -m.imag)
+
+
 @_kernel(
     *(_given(2), _changed(3), _changed(3), types.int64, _changed(3), _changed(2, types.complex128)),
 )
@@ -287,3 +324,43 @@ def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
         P_a[run, :, 4:] = 0.0
         frame[run, 2] = 0.0
         frame[run, 3] = 1.0
+
+
+@_kernel(
+    *(_changed(2), _changed(2), _changed(3), _changed(3), _changed(3)),
+    *(_given(1, types.int64), _given(3), _given(3)),
+    returns=types.Tuple((types.Array(types.float64, 2, "C"), types.Array(types.float64, 3, "C"))),
+)
+def ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z):
+    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_update`."""
+    B, m = z.shape[0], z.shape[1]
+    innovation = np.empty((B, 2 * m))
+    H_p, H_l = np.empty((B, m, 2, 3)), np.empty((B, m, 2, 2))
+    for b in range(B):
+        c, s = np.cos(x_p[b, 2]), np.sin(x_p[b, 2])
+        for j in range(m):
+            dx, dy = x_m[b, columns[j]] - x_p[b, 0], x_m[b, columns[j] + 1] - x_p[b, 1]
+            ahead, left = c * dx + s * dy, c * dy - s * dx
+            innovation[b, 2 * j] = z[b, j, 0] - ahead
+            innovation[b, 2 * j + 1] = z[b, j, 1] - left
+            H_l[b, j, 0, 0], H_l[b, j, 0, 1], H_l[b, j, 1, 0], H_l[b, j, 1, 1] = c, s, -s, c
+            H_p[b, j, 0, 0], H_p[b, j, 0, 1], H_p[b, j, 0, 2] = -c, -s, left
+            H_p[b, j, 1, 0], H_p[b, j, 1, 1], H_p[b, j, 1, 2] = s, -c, -ahead
+    S = landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H_p, H_l, columns, innovation, cov_z)
+    for b in range(B):
+        x_p[b, 2] = _wrap(x_p[b, 2])
+    return innovation, S
+
+
+@_kernel(
+    *(_changed(2), _changed(2), _changed(3), _changed(3), _changed(3), _given(1), _given(1), _given(3)),
+    *(_given(1, types.int64), _given(3), _given(3)),
+    returns=types.Tuple((types.Array(types.float64, 2, "C"), types.Array(types.float64, 3, "C"))),
+)
+def ekf_step(x_p, x_m, P_pp, P_pm, P_mm, ds, dalpha, cov, columns, z, cov_z):
+    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_step`."""
+    at = np.empty((x_p.shape[0], 2))
+    for b in range(x_p.shape[0]):
+        at[b, 0], at[b, 1] = x_p[b, 2], ds[b]
+    ekf_predict(x_p, P_pp, P_pm, at, ds, dalpha, cov)
+    return ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z)

@@ -23,9 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref._kernels import accelerated
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.filters.block_covariance import Blocks, landmark_update
+from vslam_ref.filters.ekf_step import ekf_predict, ekf_update
 from vslam_ref.filters.estimates import (
     Innovation,
     MapEstimate,
@@ -45,33 +45,6 @@ class Truth(NamedTuple):
 
     poses: Array
     landmarks: Array
-
-
-@accelerated("slam:ekf_predict")
-def ekf_predict(x_p: Array, P_pp: Array, P_pm: Array, at: Array, ds: Array, dalpha: Array, cov: Array) -> None:
-    """One prediction, in place: pose mean, P_pp <- F P_pp F^T + G Q G^T and P_pm <- F P_pm.
-
-    Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): rows
-    and columns 0 and 1 gain a multiple of row and column 2, and nothing else moves.
-
-    Parameters
-    ----------
-    x_p, P_pp, P_pm : ndarray, shapes (B, 3), (B, 3, 3), (B, 3, M)
-        Changed in place.
-    at : ndarray, shape (B, 2)
-        Heading and distance at which F and G are taken: the estimate and ds, or the truth for the ideal
-        EKF.
-    ds, dalpha, cov : ndarray, shapes (B,), (B,), (B, 2, 2)
-        The increment.
-    """
-    pose, increment = np.zeros((len(at), 3)), np.zeros((len(at), 2))
-    pose[:, 2], increment[:, 0] = at.T
-    _, J_pose, J_inc = vehicle.propagate_with_jacobians(pose, increment)
-    x_p[:, 0] += ds * np.cos(x_p[:, 2])
-    x_p[:, 1] += ds * np.sin(x_p[:, 2])
-    x_p[:, 2] = so2.wrap(x_p[:, 2] + dalpha)
-    P_pp[:] = J_pose @ P_pp @ J_pose.swapaxes(1, 2) + J_inc @ cov @ J_inc.swapaxes(1, 2)
-    P_pm[:, :2] += J_pose[:, :2, 2:] * P_pm[:, 2:]
 
 
 class EkfSlam:
@@ -147,14 +120,13 @@ class EkfSlam:
     def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
         b = self.blocks
         columns = b.columns(ids)
+        if self._truth is None:
+            return Innovation(*ekf_update(b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, columns, z, cov_z))
         landmarks = b.x_m.reshape(len(b.x_p), -1, 2)[:, columns // 2]
-        predicted = observation.vehicle_from_world_with_jacobians(b.x_p[:, None], landmarks)
-        innovation = (z - predicted.value).reshape(len(z), -1)
-        H = predicted
-        if self._truth is not None:
-            H = observation.vehicle_from_world_with_jacobians(
-                self._linearisation()[:, None], self._truth.landmarks[None, ids]
-            )
+        innovation = (z - observation.vehicle_from_world(b.x_p[:, None], landmarks)).reshape(len(z), -1)
+        H = observation.vehicle_from_world_with_jacobians(
+            self._linearisation()[:, None], self._truth.landmarks[None, ids]
+        )
         S = landmark_update(
             b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z
         )

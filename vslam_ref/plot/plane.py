@@ -66,9 +66,17 @@ def draw_arrow(
     axes.add_patch(FancyArrowPatch(a, b, **look))
 
 
-def plane(axes: Axes, title: str = "") -> None:
-    """Give axes equal scales in metres."""
-    axes.set_aspect("equal", adjustable="datalim")
+def plane(
+    axes: Axes,
+    title: str = "",
+    xlim: tuple[float, float] | None = None,
+    ylim: tuple[float, float] | None = None,
+) -> None:
+    """Give axes equal scales in metres; with limits the panel shrinks to fit them."""
+    fixed = xlim is not None and ylim is not None
+    axes.set_aspect("equal", adjustable="box" if fixed else "datalim")
+    if fixed:
+        axes.set(xlim=xlim, ylim=ylim)
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     if title:

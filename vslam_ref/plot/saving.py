@@ -12,8 +12,8 @@ __all__ = ["Figure", "save_figure"]
 PNG_DPI = 150
 
 
-def save_figure(figure: Figure, folder: Path, salt: str) -> None:
-    """Write ``figure.svg`` and ``figure.png`` into ``folder``.
+def save_figure(figure: Figure, folder: Path, salt: str, name: str = "figure") -> None:
+    """Write ``figure.svg`` and ``figure.png`` (or another ``name``) into ``folder``.
 
     Parameters
     ----------
@@ -23,7 +23,9 @@ def save_figure(figure: Figure, folder: Path, salt: str) -> None:
         Where; it exists.
     salt : str
         Seed of the ids inside the SVG, which matplotlib otherwise draws at random.
+    name : str
+        Of both files, without what follows the dot.
     """
     with matplotlib.rc_context({"svg.hashsalt": salt}):
-        figure.savefig(folder / "figure.svg", format="svg", metadata={"Date": None})
-        figure.savefig(folder / "figure.png", format="png", dpi=PNG_DPI)
+        figure.savefig(folder / f"{name}.svg", format="svg", metadata={"Date": None})
+        figure.savefig(folder / f"{name}.png", format="png", dpi=PNG_DPI)

@@ -14,22 +14,22 @@ An experiment is one module ``vslam_ref/experiments/<id with _ for ->.py``::
     EXPERIMENT = Experiment(id="iekf-fig2", title="...", source="...", config_type=Config,
                             run=run, claims=claims, figure=figure, quick=quick)
 
-=============  ==========================================================================
-module         holds
-=============  ==========================================================================
-``errors``     ``InputError``: bad input, told in one line
-``claims``     ``Claim`` and its verdict
-``config``     ``key=value`` settings of frozen dataclasses, and their reasons
-``experiment`` ``Experiment`` and ``RunContext``
-``registry``   from an id to its experiment, imported on first use
-``results``    ``Result`` and the JSON that is written of it
-``provenance`` versions, git commit, platform
-``scheduler``  ``run_batches`` on one core, many cores or a Dask cluster
-``files``      files and folders that appear whole or not at all
-``writer``     ``OUT/<id>/{figure.svg,figure.png,result.json,runs.npz}``
-``report``     ``OUT/index.html``
-``reproduce``  all of it in order
-=============  ==========================================================================
+==============  ==========================================================================
+module          holds
+==============  ==========================================================================
+``errors``      ``InputError``: bad input, told in one line
+``claims``      ``Claim`` and its verdict
+``config``      ``key=value`` settings of frozen dataclasses, and their reasons
+``experiment``  ``Experiment`` and ``RunContext``
+``registry``    from an id to its experiment, imported on first use
+``results``     ``Result`` and the JSON that is written of it
+``provenance``  versions, git commit, platform
+``scheduler``   ``run_batches`` on one core, many cores or a Dask cluster
+``files``       files and folders that appear whole or not at all
+``writer``      ``OUT/<id>/{figure.svg,figure.png,result.json,runs.npz}``
+``report``      ``OUT/index.html``
+``reproduce``   all of it in order
+==============  ==========================================================================
 """
 
 from vslam_ref.experiments.framework.claims import Claim, Verdict, verdict

@@ -82,7 +82,6 @@ def new_folder(path: Path) -> Iterator[Path]:
 
     If the block raises, ``path`` stays as it was and the temporary is removed.
     """
-    clean(path.parent)
     temporary, old = _temporary(path, "tmp"), _temporary(path, "old")
     temporary.mkdir()
     try:

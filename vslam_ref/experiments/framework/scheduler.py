@@ -26,6 +26,8 @@ SCHEDULERS = ("local", "dask")
 DASK_TIMEOUT = 10.0
 """Seconds to wait for a Dask scheduler, and for its first worker, before giving up."""
 
+_chosen_for_good: list[Any] = []
+
 
 def run_batches(
     function: Callable[[T], R],
@@ -167,11 +169,9 @@ class _Task(Generic[T, R]):
     backend: str
 
     def __call__(self, batch: T) -> R:
-        from vslam_ref import _kernels
-
         _one_thread_for_good()
-        with _kernels.use_backend(self.backend):
-            return self.function(batch)
+        _backend_for_good(self.backend)
+        return self.function(batch)
 
 
 def _one_thread_for_good() -> None:
@@ -183,6 +183,20 @@ def _one_thread_for_good() -> None:
         sys.modules["numba"].set_num_threads(1)
     else:
         os.environ["NUMBA_NUM_THREADS"] = "1"
+
+
+def _backend_for_good(name: str) -> None:
+    """Choose the backend of a worker process.
+
+    It is not restored after a task: tasks that run side by side in the threads of one Dask worker
+    would undo each other's choice.
+    """
+    from vslam_ref import _kernels
+
+    if _kernels.backend() != name:
+        choice = _kernels.use_backend(name)
+        choice.__enter__()
+        _chosen_for_good.append(choice)  # were it collected, it would restore the old backend
 
 
 def _current_backend() -> str:

@@ -26,6 +26,8 @@ IntArray = NDArray[np.int64]
 
 _R = slice(0, lift.VEHICLE)
 _L = slice(lift.VEHICLE, None)
+_LONGEST_ACCUMULATION = 32
+"""Predictions after which P is brought up to date without a measurement: each one moves all columns of N."""
 
 
 class LiftedCarlemanEkf:
@@ -95,6 +97,8 @@ class LiftedCarlemanEkf:
         self._N.append(noise)
         self._M_R, self._M_L = M_R @ self._M_R, M_L @ self._M_L
         self._steps += 1
+        if self._steps >= _LONGEST_ACCUMULATION:
+            self._apply_accumulated()
 
     def _noise_factor(self, factor: Array) -> Array:
         """J_U sqrt(Q_U), shape (B, 11 + 6 n, r): each monomial's matrix applied to the mean."""

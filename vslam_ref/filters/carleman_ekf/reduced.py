@@ -114,25 +114,11 @@ def _real_covariance(plain: Complex, conj: Complex) -> Array:
     return np.array(rows).transpose(2, 0, 1) / 2
 
 
-_CONTROL = {"first_order": control_first_order, "gaussian": control_gaussian}
+_CONTROL = ("first_order", "gaussian")
 
 
-@accelerated("slam:reduced_predict")
-def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
-    """One prediction, in place, without touching a landmark.
-
-    Parameters
-    ----------
-    x_p : ndarray, shape (B, 4)
-        (x, y, sin, cos).
-    P_a : ndarray, shape (B, 8, 8)
-        Covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) accumulated since the
-        last measurement.
-    frame : ndarray of complex, shape (B, 4)
-        c and tau; and, since the last measurement, D and e with p <- p + D h, h <- e h.
-    control, cov : ndarray, shapes (B, 5), (B, 5, 5)
-        Moments of (ds, Re m, Im m, Re t, Im t).
-    """
+def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
+    """One prediction from the control's moments; see :func:`reduced_predict`."""
     ds, m, t = control[:, 0], control[:, 1] + 1j * control[:, 2], control[:, 3] + 1j * control[:, 4]
     c, tau = m * frame[:, 0], frame[:, 1]
     step = np.zeros((len(x_p), 4, 4))
@@ -155,6 +141,33 @@ def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov:
     frame[:, 0], frame[:, 1] = c, m * tau + t
     frame[:, 2] += ds * frame[:, 3]
     frame[:, 3] *= m.conj()
+
+
+@accelerated("slam:reduced_predict")
+def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
+    """One prediction, in place, without touching a landmark.
+
+    Parameters
+    ----------
+    x_p : ndarray, shape (B, 4)
+        (x, y, sin, cos).
+    P_a : ndarray, shape (B, 8, 8)
+        Covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) accumulated since the
+        last measurement.
+    frame : ndarray of complex, shape (B, 4)
+        c and tau; and, since the last measurement, D and e with p <- p + D h, h <- e h.
+    control, cov : ndarray, shapes (B, 5), (B, 5, 5)
+        Moments of (ds, Re m, Im m, Re t, Im t).
+    """
+    _predict(x_p, P_a, frame, control, cov)
+
+
+@accelerated("slam:reduced_predict_first_order")
+def reduced_predict_first_order(
+    x_p: Array, P_a: Array, frame: Complex, ds: Array, dalpha: Array, cov: Array
+) -> None:
+    """:func:`reduced_predict` with the first-order moments of an increment ds, dalpha (B,), cov (B, 2, 2)."""
+    _predict(x_p, P_a, frame, *control_first_order(Increment(ds, dalpha, cov)))
 
 
 @accelerated("slam:reduced_apply")
@@ -209,7 +222,7 @@ class ReducedCarlemanEkf:
         if control not in _CONTROL:
             raise ValueError(f"control={control!r}: must be one of {', '.join(_CONTROL)}")
         x, P = start_moments(*as_batch(mean, cov), start)
-        self._control = _CONTROL[control]
+        self._first_order = control == "first_order"
         self.with_map = with_map
         self.blocks = Blocks(x, P, landmark_states=4 if with_map else 2, capacity=capacity)
         self._frame = np.tile(np.array([1.0, 0.0, 0.0, 1.0], dtype=np.complex128), (len(x), 1))
@@ -219,7 +232,10 @@ class ReducedCarlemanEkf:
 
     def predict(self, increment: Increment) -> None:
         """Move by an increment, in O(1). The reduced :eq:`eq-b16` (B16) and B18."""
-        reduced_predict(self.blocks.x_p, self._P_a, self._frame, *self._control(increment))
+        if self._first_order:
+            reduced_predict_first_order(self.blocks.x_p, self._P_a, self._frame, *increment)
+        else:
+            reduced_predict(self.blocks.x_p, self._P_a, self._frame, *control_gaussian(increment))
 
     def _apply(self) -> None:
         b = self.blocks

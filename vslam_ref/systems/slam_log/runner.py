@@ -39,16 +39,16 @@ FILTERS: Mapping[str, Build] = {"ekf": EkfSlam, "iekf": _iekf, "ekf-anchored": A
 
 
 def _setting(default: float, unit: str, reason: str) -> float:
-    return field(default=default, metadata={"unit": unit, "reason": reason})  # type: ignore[no-any-return]
+    return field(default=default, metadata={"unit": unit, "reason": reason})
 
 
 @dataclass(frozen=True)
 class RunSettings:
     """How a log is run; nothing here depends on its truth."""
 
-    start_sigma_position: float = _setting(0.02, "m", "start pose is the frame's origin; how well it is known")
-    start_sigma_heading: float = _setting(0.02, "rad", "about one degree: axle against motion-capture markers")
-    gate: float = _setting(13.816, "", "chi-squared, 2 degrees of freedom: 1 in 1000 good sightings is lost")
+    start_sigma_position: float = _setting(0.02, "m", "how well the start pose is known")
+    start_sigma_heading: float = _setting(0.02, "rad", "one degree: axle against motion-capture markers")
+    gate: float = _setting(13.816, "", "chi-squared(2): 1 in 1000 good sightings is lost")
     record_period: float = _setting(0.1, "s", "the trajectory is written and judged at this spacing")
     max_step: float = _setting(0.0, "s", "longest prediction; 0: one for every odometry sample")
 

@@ -58,7 +58,8 @@ def control_increments(log: SlamLog, calibration: Calibration) -> Array:
         raw = vehicle.ackermann(steered, log.wheelbase, 1.0) * dt
     else:
         raw = u * dt
-    return np.asarray(raw * np.array([calibration.distance_gain, calibration.turn_gain]))
+    ds = calibration.distance_gain * raw[:, 0]
+    return np.stack([ds, calibration.turn_gain * raw[:, 1] + calibration.drift * ds], -1)
 
 
 def increment_variances(increments: Array, calibration: Calibration) -> Array:
@@ -75,7 +76,9 @@ def sighting_times(log: SlamLog, calibration: Calibration) -> Array:
     return np.clip(taken, log.times[0], log.times[-1])
 
 
-def build_timeline(log: SlamLog, calibration: Calibration, record_times: Array, max_step: float = 0.0) -> Timeline:
+def build_timeline(
+    log: SlamLog, calibration: Calibration, record_times: Array, max_step: float = 0.0
+) -> Timeline:
     """Cut the log at its sightings and at ``record_times``.
 
     Parameters
@@ -98,11 +101,10 @@ def build_timeline(log: SlamLog, calibration: Calibration, record_times: Array, 
     inc = control_increments(log, calibration)
     # zero-order hold: the sums up to any time are linear between the stamps
     start, where = np.unique(log.times, return_index=True)
-    way = np.vstack([np.zeros(4), np.cumsum(np.hstack([inc, increment_variances(inc, calibration)]), 0)])[where]
+    each = np.hstack([inc, increment_variances(inc, calibration)])
+    way = np.vstack([np.zeros(4), np.cumsum(each, 0)])[where]
     sums = np.stack([np.interp(cuts, start, way[:, i]) for i in range(4)], -1)
     steps = np.diff(sums, axis=0)
     cov = np.zeros((len(steps), 2, 2))
     cov[:, 0, 0], cov[:, 1, 1] = steps[:, 2], steps[:, 3]
-    return Timeline(
-        cuts, steps[:, :2], cov, np.searchsorted(cuts, seen), np.searchsorted(cuts, record_times)
-    )
+    return Timeline(cuts, steps[:, :2], cov, np.searchsorted(cuts, seen), np.searchsorted(cuts, record_times))

@@ -1,0 +1,273 @@
+"""Every (NumPy function, Numba twin) pair on the same inputs: the NumPy function is the truth.
+
+``INPUTS`` has one row per entry of ``_kernels.REGISTRY``: a twin without its row fails the build.  The
+functions work in place, so each gets its own copy, laid out as in the filters: views into larger
+arrays, covariances broadcast over the batch and read-only.
+
+Tolerance: both compute the same sums in another order.  With inner products of at most N = 40 terms of
+size ``size`` (the largest number of the inputs and results, squared where products meet) they differ by 2 N
+eps size^2; where S is inverted, cond(S) < 100 multiplies it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vslam_ref
+from vslam_ref import _kernels
+
+pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
+
+EPS = float(np.finfo(float).eps)
+TOLERANCE = 2 * 40 * EPS * 100
+Rng = np.random.Generator
+
+
+def everything_imported() -> None:
+    """Twins are declared where their functions are defined: import all numeric rooms."""
+    for room in ("geometry", "filters", "metrics", "worlds", "estimation", "features", "grids", "systems"):
+        try:
+            package = importlib.import_module(f"vslam_ref.{room}")
+        except ModuleNotFoundError:
+            continue
+        for info in pkgutil.walk_packages(package.__path__, f"vslam_ref.{room}."):
+            importlib.import_module(info.name)
+
+
+everything_imported()
+
+
+# --- inputs -------------------------------------------------------------------------------------------
+
+
+def room_for(a: np.ndarray) -> np.ndarray:
+    """The same numbers as a view into a larger array, as a filter with spare capacity holds them."""
+    big = np.full(tuple(n + 3 * (i > 0) for i, n in enumerate(a.shape)), np.nan, dtype=a.dtype)
+    view = big[tuple(slice(0, n) for n in a.shape)]
+    view[...] = a
+    return view
+
+
+def covariance(rng: Rng, B: int, n: int) -> np.ndarray:
+    L = rng.normal(size=(B, n, n)) / np.sqrt(n)
+    return L @ L.swapaxes(1, 2) + 0.1 * np.eye(n)
+
+
+def given_cov(rng: Rng, B: int, n: int) -> np.ndarray:
+    """A read-only broadcast view, as made from one covariance for all runs."""
+    return np.broadcast_to(0.1 * covariance(rng, 1, n)[0], (B, n, n))
+
+
+def blocks(rng: Rng, B: int, p: int, M: int) -> tuple[np.ndarray, ...]:
+    """x_p, x_m, P_pp, P_pm, P_mm of one positive definite covariance."""
+    P = covariance(rng, B, p + M)
+    parts = (rng.normal(size=(B, p)), rng.normal(size=(B, M)), P[:, :p, :p], P[:, :p, p:], P[:, p:, p:])
+    return tuple(room_for(part) for part in parts)
+
+
+def seen(rng: Rng, B: int, M: int, b: int, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """columns (m,), z (B, m, 2), cov_z (m, 2, 2)."""
+    columns = b * rng.permutation(M // b)[:m]
+    return columns, rng.normal(size=(B, m, 2)), np.broadcast_to(np.array([[0.5, 0.1], [0.1, 0.4]]), (m, 2, 2))
+
+
+def for_landmark_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    p, b, m = 3, 2, min(3, n)
+    columns, z, cov_z = seen(rng, B, b * n, b, m)
+    H_p, H_l = rng.normal(size=(B, m, 2, p)), rng.normal(size=(B, m, 2, 2))
+    return (*blocks(rng, B, p, b * n), H_p, H_l, columns, z.reshape(B, -1), cov_z)
+
+
+def for_reduced_landmark_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Four pose states, four map states per landmark, and an H without the pose: a read-only view."""
+    p, b, m = 4, 4, min(3, n)
+    columns, z, cov_z = seen(rng, B, b * n, b, m)
+    H_l = np.broadcast_to(np.array([[0.6, -0.8], [0.8, 0.6]]), (B, m, 2, 2))
+    return (*blocks(rng, B, p, b * n), np.zeros((B, m, 2, p)), H_l, columns, z.reshape(B, -1), cov_z)
+
+
+def for_ekf_predict(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    x_p, _, P_pp, P_pm, _ = blocks(rng, B, 3, 2 * n)
+    x_p[:, 2] = rng.uniform(-np.pi, np.pi, B)
+    at = np.stack([rng.uniform(-3, 3, B), rng.normal(size=B)], 1)
+    return x_p, P_pp, P_pm, at, rng.normal(size=B), rng.uniform(-3, 3, B), given_cov(rng, B, 2)
+
+
+def for_ekf_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    return (*blocks(rng, B, 3, 2 * n), *seen(rng, B, 2 * n, 2, min(3, n)))
+
+
+def for_ekf_step(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    increment = rng.normal(size=B), rng.uniform(-3, 3, B), given_cov(rng, B, 2)
+    return (*blocks(rng, B, 3, 2 * n), *increment, *seen(rng, B, 2 * n, 2, min(3, n)))
+
+
+def reduced_state(rng: Rng, B: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x_p (B, 4), P_a (B, 8, 8) and the frame (c, tau, D, e), with |c| and |e| near 1."""
+    x_p, theta = rng.normal(size=(B, 4)), rng.uniform(-3, 3, B)
+    x_p[:, 2], x_p[:, 3] = np.sin(theta), np.cos(theta)
+    turn = np.exp(1j * rng.uniform(-3, 3, (2, B)))
+    shift = rng.normal(size=(2, B)) + 1j * rng.normal(size=(2, B))
+    return x_p, covariance(rng, B, 8), np.stack([turn[0], shift[0], shift[1], turn[1]], 1)
+
+
+def for_reduced_predict(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    ds, m = rng.normal(size=B), np.exp(1j * rng.uniform(-3, 3, B))
+    control = np.stack([ds, m.real, m.imag, (ds * m).real, (ds * m).imag], 1)
+    return (*reduced_state(rng, B), control, given_cov(rng, B, 5))
+
+
+def for_reduced_predict_first_order(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    return (*reduced_state(rng, B), rng.normal(size=B), rng.uniform(-3, 3, B), given_cov(rng, B, 2))
+
+
+def for_reduced_apply(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    b = 2 + 2 * (n % 2)
+    _, x_m, _, P_pm, P_mm = blocks(rng, B, 4, b * n)
+    _, P_a, frame = reduced_state(rng, B)
+    return x_m, P_pm, P_mm, b, P_a, frame
+
+
+INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
+    "slam:landmark_update": [for_landmark_update, for_reduced_landmark_update],
+    "slam:ekf_predict": [for_ekf_predict],
+    "slam:ekf_update": [for_ekf_update],
+    "slam:ekf_step": [for_ekf_step],
+    "slam:reduced_predict": [for_reduced_predict],
+    "slam:reduced_predict_first_order": [for_reduced_predict_first_order],
+    "slam:reduced_apply": [for_reduced_apply],
+}
+
+
+# --- the registry -------------------------------------------------------------------------------------
+
+
+def test_every_twin_has_its_inputs() -> None:
+    assert {twin for _, twin in _kernels.REGISTRY.values()} == set(INPUTS)
+
+
+def test_every_public_function_of_the_kernels_is_a_twin() -> None:
+    twins = {twin for _, twin in _kernels.REGISTRY.values()}
+    for info in pkgutil.iter_modules(_kernels.__path__):
+        module = importlib.import_module(f"{_kernels.__name__}.{info.name}")
+        for name, thing in vars(module).items():
+            own = getattr(thing, "__module__", None) == module.__name__
+            if own and callable(thing) and not name.startswith("_"):
+                assert f"{info.name}:{name}" in twins, f"{info.name}.{name} is the twin of nothing"
+
+
+@pytest.mark.parametrize("name", sorted(_kernels.REGISTRY))
+def test_twins_have_the_signature_of_their_function(name: str) -> None:
+    function, twin = _kernels.REGISTRY[name]
+    kernel = _kernels._load(twin)
+    mine = list(inspect.signature(function).parameters)
+    assert list(inspect.signature(getattr(kernel, "py_func", kernel)).parameters) == mine
+
+
+# --- the numbers --------------------------------------------------------------------------------------
+
+CASES = [(twin, build) for twin, builders in INPUTS.items() for build in builders]
+
+
+def copies(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Copies of what may be written to, with its strides; read-only views stay as they are."""
+    return tuple(room_for(a) if isinstance(a, np.ndarray) and a.flags.writeable else a for a in arguments)
+
+
+def outputs(result: Any) -> list[np.ndarray]:
+    if result is None:
+        return []
+    return list(result) if isinstance(result, tuple) else [result]
+
+
+@pytest.mark.parametrize(("B", "n"), [(1, 1), (2, 5), (3, 2), (5, 10)])
+@pytest.mark.parametrize(("twin", "build"), CASES, ids=[f"{t}-{b.__name__}" for t, b in CASES])
+def test_twin_does_what_numpy_does(twin: str, build: Callable[..., tuple[Any, ...]], B: int, n: int) -> None:
+    (function,) = (f for f, t in _kernels.REGISTRY.values() if t == twin)
+    arguments = build(np.random.default_rng(10 * B + n), B, n)
+    with _kernels.use_backend("numpy"):  # functions call one another: NumPy all the way down
+        expected = copies(arguments)
+        returned = outputs(function(*expected))
+    found = copies(arguments)
+    also = outputs(_kernels._load(twin)(*found))
+    assert len(returned) == len(also)
+    changed = 0
+    for before, a, b in zip(
+        [*arguments, *[None] * len(also)], [*expected, *returned], [*found, *also], strict=True
+    ):
+        if not isinstance(a, np.ndarray):
+            continue
+        assert a.shape == b.shape
+        assert np.isfinite(b).all()
+        size = max(1.0, np.abs(a).max(initial=0.0))
+        assert np.abs(a - b).max(initial=0.0) <= TOLERANCE * size**2
+        changed += before is not None and not np.array_equal(before, a)
+    assert changed > 0, "an in-place function that changes nothing was not tested"
+
+
+@pytest.mark.parametrize(("twin", "build"), CASES, ids=[f"{t}-{b.__name__}" for t, b in CASES])
+def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, ...]]) -> None:
+    """The tolerance has teeth: perturbing one input by 1e-6 shows, in at least one output."""
+    (function,) = (f for f, t in _kernels.REGISTRY.values() if t == twin)
+    arguments = build(np.random.default_rng(0), 2, 3)
+    with _kernels.use_backend("numpy"):
+        a, b = copies(arguments), copies(arguments)
+        b[0][...] += 1e-6
+        r, s = outputs(function(*a)), outputs(function(*b))
+    pairs = [(u, v) for u, v in zip([*a, *r], [*b, *s], strict=True) if isinstance(u, np.ndarray)]
+    assert max(np.abs(u - v).max(initial=0.0) for u, v in pairs) > TOLERANCE * 100
+
+
+# --- choosing -----------------------------------------------------------------------------------------
+
+
+def test_backend_is_chosen_and_restored() -> None:
+    before = _kernels.backend()
+    with _kernels.use_backend("numpy") as name:
+        assert name == _kernels.backend() == "numpy"
+        with _kernels.use_backend("auto") as inner:
+            assert inner == "numba"
+        assert _kernels.backend() == "numpy"
+    assert _kernels.backend() == before
+
+
+def test_unknown_backend_is_refused() -> None:
+    with pytest.raises(ValueError, match="VSLAM_REF_BACKEND='fortran'"), _kernels.use_backend("fortran"):
+        pass
+
+
+def test_a_filter_gives_the_same_on_both_backends() -> None:
+    """End to end, 40 steps with 4 landmarks: 40 times the tolerance of one."""
+    from vslam_ref.filters import carleman_ekf, ekf_slam
+    from vslam_ref.filters.vehicle import Increment
+
+    def run(slam: Any) -> Any:
+        rng = np.random.default_rng(0)
+        for k in range(40):
+            slam.predict(
+                Increment(np.full(2, 0.1), rng.normal(0.1, 0.01, 2), 1e-4 * np.eye(2) * np.ones((2, 1, 1)))
+            )
+            if k % 4 == 0:
+                slam.update([0, 1, 2 + (k > 20)], rng.normal([[1, 2]], 0.1, (2, 3, 2)), 0.01 * np.eye(2))
+        return slam.pose()
+
+    for make in (ekf_slam.EkfSlam, ekf_slam.AnchoredEkf, carleman_ekf.ReducedCarlemanEkf):
+        results = []
+        for name in ("numpy", "numba"):
+            with _kernels.use_backend(name):
+                results.append(run(make(np.zeros((2, 3)), 0.1 * np.eye(3))))
+        for a, b in zip(*results, strict=True):
+            assert np.abs(a - b).max() < 40 * TOLERANCE
+
+
+def test_package_has_no_numba_import_of_its_own() -> None:
+    """Numba is imported at the first accelerated call only."""
+    assert "numba" not in vars(vslam_ref)
+    assert "numba" not in vars(_kernels)

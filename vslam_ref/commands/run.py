@@ -1,0 +1,79 @@
+"""``vslam-ref run``: a system over recorded data."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from vslam_ref.commands.options import add_json, at_least, json_target, write_json
+
+HELP = "run a system over recorded data and compare it with the truth"
+EPILOG = """\
+systems:
+  ekf-slam    EKF-SLAM; the IEKF, the anchored EKF and a batch solution are shown beside it
+  iekf-slam   IEKF-SLAM: the improved EKF of seed B (neither invariant nor iterated); same company
+
+data sets: mrclam (--robot N), victoria_park, found through VSLAM_REF_DATA; or a folder of one of these formats.
+Gains and noises are those identified without truth; '--set calibration.sigma_range=0.05' changes one,
+'--set run.gate=9' a setting of the run.
+
+examples:
+  vslam-ref run ekf-slam mrclam --robot 3 --out out/robot3
+  vslam-ref run iekf-slam victoria_park --out out/park --json park.json"""
+
+SYSTEMS = {"ekf-slam": "ekf", "iekf-slam": "iekf"}
+"""System -> the filter whose numbers stand on top of the JSON."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this command."""
+    parser.add_argument("system", choices=sorted(SYSTEMS), metavar="SYSTEM", help="what to run; see below")
+    parser.add_argument("dataset", metavar="DATASET", help="what to run it on; see below")
+    parser.add_argument("--robot", type=at_least(1), metavar="N", help="robot of an MRCLAM set (default: 1)")
+    parser.add_argument("--out", metavar="DIR", help="write figures, trajectories, maps and a page there")
+    parser.add_argument("--no-batch", action="store_true", help="leave the batch solution out")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting; may be repeated"
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the filters over a log, print and write their numbers."""
+    import time
+
+    from vslam_ref.commands.tables import table
+    from vslam_ref.experiments.framework.config import apply_overrides
+    from vslam_ref.experiments.framework.provenance import versions
+    from vslam_ref.experiments.slam_log import compare as logs
+
+    target = json_target(options)
+    out = _out(options)
+    began = time.perf_counter()
+    source = logs.open_source(options.dataset, options.robot)
+    config = apply_overrides(logs.default_config(source.dataset), options.set)
+    comparison = logs.compare(source, config, batch=not options.no_batch)
+    content = logs.document(comparison, SYSTEMS[options.system])
+    content |= {"seconds": time.perf_counter() - began, "versions": versions()}
+
+    from vslam_ref.experiments.slam_log import report
+
+    heads, rows = report.number_rows(content)
+    print(
+        f"{source.log.name}: {content['sightings']} sightings of landmarks, truth: {content['truth'] or 'none'}"
+    )
+    print(table(heads, rows))
+    if out is not None:
+        report.write_report(out, comparison, content)
+        print(f"page: {out / 'report.html'}")
+    write_json(target, content)
+    return 0
+
+
+def _out(options: argparse.Namespace) -> Path | None:
+    """Return the checked output folder, before any work."""
+    if options.out is None:
+        return None
+    from vslam_ref.experiments.slam_log.report import check_out
+
+    return check_out(options.out)

@@ -1,0 +1,185 @@
+"""The three filters, and the batch solution, of one recorded log beside its truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.datasets import catalogue, mrclam, noise, victoria_park
+from vslam_ref.experiments.framework.config import config_to_dict
+from vslam_ref.experiments.framework.errors import InputError, suggestion
+from vslam_ref.filters.estimates import MapEstimate
+from vslam_ref.geometry import se2
+from vslam_ref.systems.slam_log import (
+    FILTERS,
+    Calibration,
+    LogRun,
+    RunSettings,
+    SlamLog,
+    Truth,
+    run_log,
+    summary,
+)
+from vslam_ref.systems.slam_log.runner import Seen
+
+Array = NDArray[np.float64]
+
+SETS = {"mrclam": "utias_mrclam", "victoria_park": "victoria_park"}
+"""Name on the command line -> folder of the data set; the folder's name is accepted too."""
+DEFAULT_ROBOT = 1
+
+
+@dataclass(frozen=True)
+class LogConfig:
+    """Everything a run of a log depends on."""
+
+    calibration: Calibration = field(default_factory=Calibration)
+    run: RunSettings = field(default_factory=RunSettings)
+
+
+class Source(NamedTuple):
+    """Where a log came from: set name, robot (None where there is one vehicle), log, truth or None."""
+
+    dataset: str
+    robot: int | None
+    log: SlamLog
+    truth: Truth | None
+
+
+class Comparison(NamedTuple):
+    """What came of one log."""
+
+    source: Source
+    config: LogConfig
+    runs: dict[str, LogRun]
+    batch: LogRun | None
+
+
+def open_source(dataset: str, robot: int | None) -> Source:
+    """Find a data set by its name or its folder, and read log and truth.
+
+    Parameters
+    ----------
+    dataset : str
+        ``mrclam``, ``victoria_park``, the name of their folders in ``VSLAM_REF_DATA``, or a path to a
+        folder of one of these formats.
+    robot : int or None
+        For ``mrclam``; None means robot 1.
+
+    Raises
+    ------
+    ValueError
+        If nothing is found, or a file is not as it should be.
+    """
+    kind, folder = _locate(dataset)
+    if kind == "victoria_park":
+        if robot is not None:
+            raise InputError(f"--robot {robot}: Victoria Park has one vehicle; leave it out")
+        log = victoria_park.read_log(folder)
+        has_truth = (folder / "aa3_gpsx.mat").is_file()
+        return Source(kind, None, log, victoria_park.read_truth(folder, log) if has_truth else None)
+    folder = mrclam.set_folder(folder)
+    robot = DEFAULT_ROBOT if robot is None else robot
+    log = mrclam.read_log(folder, robot)
+    has_truth = any(folder.glob(f"Robot{robot}_Groundtruth.dat*"))
+    return Source(kind, robot, log, mrclam.read_truth(folder, robot, log) if has_truth else None)
+
+
+def _locate(dataset: str) -> tuple[str, Path]:
+    """Format and folder of a data set."""
+    for name, folder_name in SETS.items():
+        if dataset in (name, folder_name):
+            return name, catalogue.require(folder_name)
+    folder = Path(dataset).expanduser()
+    if not folder.is_dir():
+        hint = suggestion(dataset, SETS)
+        raise InputError(f"unknown data set {dataset!r}{hint}; expected {', '.join(SETS)} or a folder of one")
+    if (folder / "victoria_park.txt").is_file() or (folder / "aa3_dr.mat").is_file():
+        return "victoria_park", folder
+    if mrclam.robots(folder) or any(folder.glob("MRCLAM_Dataset*")):
+        return "mrclam", folder
+    raise InputError(
+        f"folder {dataset!r} holds neither RobotN_Odometry.dat nor aa3_dr.mat and victoria_park.txt"
+    )
+
+
+def default_config(dataset: str) -> LogConfig:
+    """The identified values of a set, and the settings of a run."""
+    return LogConfig(noise.calibration(dataset), RunSettings())
+
+
+def compare(
+    source: Source, config: LogConfig, names: Sequence[str] = tuple(FILTERS), batch: bool = True
+) -> Comparison:
+    """Run filters over a log, and its batch solution."""
+    runs = {name: run_log(source.log, config.calibration, name, config.run) for name in names}
+    bound = None
+    if batch:
+        from vslam_ref.experiments.slam_log.batch import solve_batch
+
+        start = runs["ekf"] if "ekf" in runs else run_log(source.log, config.calibration, "ekf", config.run)
+        bound = as_run(solve_batch(source.log, config.calibration, start, gate=config.run.gate), start)
+    return Comparison(source, config, runs, bound)
+
+
+def as_run(batch: Any, like: LogRun) -> LogRun:
+    """A batch solution as a run, so that it is judged alike.
+
+    Its poses stand at sightings; at the records of ``like`` they are that run's motion in between,
+    corrected by what the batch says at both ends (in the vehicle frame, linearly in time).  It has no
+    covariances: they are NaN.
+    """
+    at_nodes = np.stack(
+        [np.interp(batch.times, like.times, column) for column in _unwrapped(like.poses).T], -1
+    )
+    local = se2.between(at_nodes, batch.poses)
+    steps = np.stack([np.interp(like.times, batch.times, column) for column in _unwrapped(local).T], -1)
+    poses = se2.compose(like.poses, steps)
+    covs = np.full((len(poses), 3, 3), np.nan)
+    marks = MapEstimate(batch.ids, batch.landmarks[None], np.full((1, len(batch.ids), 2, 2), np.nan))
+    none = np.zeros((len(batch.used), 2))
+    seen = Seen(
+        none[:, 0],
+        none[:, 0].astype(np.int64),
+        none,
+        batch.sightings,
+        np.zeros((len(none), 2, 2)),
+        batch.used,
+    )
+    return LogRun("batch", like.times, poses, covs, marks, seen)
+
+
+def _unwrapped(poses: Array) -> Array:
+    return np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
+
+
+def document(comparison: Comparison, asked: str) -> dict[str, Any]:
+    """The JSON of a run: the asked filter's numbers on top, all filters' beside them."""
+    source = comparison.source
+    filters = {name: summary(run, source.truth) for name, run in comparison.runs.items()}
+    bound = None
+    if comparison.batch is not None:
+        bound = {**summary(comparison.batch, source.truth), "nees_mean": None}
+    return {
+        "dataset": source.dataset,
+        "robot": source.robot,
+        "filter": asked,
+        **filters[asked],
+        "filters": filters,
+        "batch": bound,
+        "sightings": int(sum(len(s.ids) for s in source.log.sightings)),
+        "dropped": dict(source.log.dropped),
+        "truth": _truth_note(source.truth),
+        "config": config_to_dict(comparison.config),
+    }
+
+
+def _truth_note(truth: Truth | None) -> str | None:
+    if truth is None:
+        return None
+    return "motion capture" if truth.exact else "GPS, jumps excluded"

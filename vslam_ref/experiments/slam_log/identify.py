@@ -1,0 +1,215 @@
+"""Gains, delays and noises of a data set, found from its logs alone: no truth is opened here.
+
+    python -m vslam_ref.experiments.slam_log.identify mrclam          # prints; --write FILE writes
+
+Two steps are repeated ``ROUNDS`` times, on all logs of the set together:
+
+1. *gains and offsets*: a batch solution of each log with these values unknown.  A robot that sees one
+   landmark twice, with a turn and a way in between, has measured its own odometry.  The logs'
+   estimates are averaged with their information matrices, so all robots get the same values;
+2. *noises*: the five sigmas that make the innovations of the EKF most likely.  An innovation's
+   covariance contains odometry noise, sensor noise and map; one that is too small or too large costs
+   likelihood.  One sighting in a hundred is allowed to be anything inside the sensor's field, or a
+   few misread barcodes would inflate every sigma.
+
+What the values rest on is written beside them: both logs' own gains with standard errors, the
+likelihoods, and residuals of repeated sightings (the same landmark within half a second, from almost
+the same place).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.experiments.slam_log.batch import Batch, solve_batch
+from vslam_ref.systems.slam_log import Calibration, LogRun, RunSettings, SlamLog, run_log
+
+Array = NDArray[np.float64]
+
+NOISES = ("sigma_distance", "sigma_turn", "sigma_drift", "sigma_range", "sigma_bearing")
+FREE = {
+    "mrclam": (
+        *("distance_gain", "turn_gain", "drift", "sighting_delay"),
+        *("sensor_ahead", "bearing_offset", "range_offset"),
+    ),
+    "victoria_park": ("distance_gain", "turn_gain", "steering_offset", "sensor_ahead", "bearing_offset"),
+}
+"""Gains and offsets each set lets vary."""
+
+START = {
+    "mrclam": Calibration(sighting_delay=0.2, range_cosine=1.0, sigma_bearing=0.006),
+    "victoria_park": Calibration(sensor_ahead=3.78, sigma_range=0.3),
+}
+OUTLIERS = 0.01
+ROUNDS = 3
+SETTINGS = RunSettings(max_step=0.1, start_sigma_position=0.0, start_sigma_heading=0.0)
+"""Faster than odometry rate; the start is the frame, so it is certain."""
+
+
+def field_area(log: SlamLog) -> float:
+    """Area the sensor overlooks, m^2, from the ranges and bearings it reported."""
+    polar = np.concatenate([s.polar for s in log.sightings])
+    return float(polar[:, 0].max() ** 2 * np.ptp(polar[:, 1]) / 2)
+
+
+def log_likelihood(run: LogRun, area: float) -> float:
+    """Sum over sightings of log((1 - OUTLIERS) N(innovation; 0, S) + OUTLIERS / area)."""
+    _, log_det = np.linalg.slogdet(run.seen.S)
+    normal = -0.5 * (run.seen.nis + log_det) - np.log(2 * np.pi)
+    return float(np.sum(np.logaddexp(np.log1p(-OUTLIERS) + normal, np.log(OUTLIERS / area))))
+
+
+def pooled_gains(batches: Sequence[Batch]) -> tuple[Array, Array]:
+    """Mean (f,) of the logs' free values, weighted with their information, and its covariance (f, f)."""
+    information = [np.linalg.inv(b.free_cov) for b in batches]
+    values = [np.array([getattr(b.calibration, name) for name in b.free]) for b in batches]
+    cov = np.linalg.inv(np.sum(information, 0))
+    return cov @ np.sum([i @ v for i, v in zip(information, values, strict=True)], 0), cov
+
+
+def fit_gains(
+    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str]
+) -> tuple[Calibration, list[Batch]]:
+    """Step 1: one batch solution per log, free values averaged."""
+    batches = []
+    for log in logs:
+        start = run_log(log, calibration, "ekf", SETTINGS)
+        batches.append(solve_batch(log, calibration, start, free))
+    values, _ = pooled_gains(batches)
+    return replace(calibration, **dict(zip(free, values.tolist(), strict=True))), batches
+
+
+def fit_noises(
+    logs: Sequence[SlamLog], calibration: Calibration, iterations: int = 12
+) -> tuple[Calibration, float]:
+    """Step 2: the most likely sigmas, by a quasi-Newton search in their logarithms."""
+    from scipy.optimize import minimize
+
+    areas = [field_area(log) for log in logs]
+    start = np.log([getattr(calibration, name) for name in NOISES])
+
+    def at(x: Array) -> Calibration:
+        return replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True)))
+
+    def cost(x: Array) -> float:
+        runs = (run_log(log, at(x), "ekf", SETTINGS) for log in logs)
+        return -sum(log_likelihood(run, area) for run, area in zip(runs, areas, strict=True))
+
+    # gated sightings make steps in the likelihood: differences over 3 % look past them
+    bounds = [(s - 1.5, s + 1.5) for s in start]
+    options = {"maxiter": iterations, "eps": 0.03, "ftol": 1e-6}
+    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=options)
+    return at(found.x), -float(found.fun)
+
+
+def repeated_sightings(log: SlamLog, within: float = 0.5) -> dict[str, float | int]:
+    """Spread of range and bearing of one landmark between neighbouring sightings, robust, over sqrt(2).
+
+    It holds the motion in between too, so it is an upper bound on the part of the noise that changes
+    from picture to picture.
+    """
+    last: dict[int, tuple[float, Array]] = {}
+    steps = []
+    for sighting in log.sightings:
+        for identity, polar in zip(sighting.ids.tolist(), sighting.polar, strict=True):
+            before = last.get(identity)
+            if before is not None and sighting.time - before[0] <= within:
+                steps.append(polar - before[1])
+            last[identity] = (sighting.time, polar)
+    if not steps:
+        return {"pairs": 0}
+    centred = np.array(steps) - np.median(steps, 0)
+    spread = 1.4826 * np.median(np.abs(centred), 0) / np.sqrt(2)
+    return {"pairs": len(steps), "range_m": float(spread[0]), "bearing_rad": float(spread[1])}
+
+
+def identify(
+    logs: Sequence[SlamLog], start: Calibration, free: Sequence[str], rounds: int = ROUNDS
+) -> dict[str, Any]:
+    """Alternate the two steps; returns the document that is committed."""
+    calibration = start
+    history = []
+    batches: list[Batch] = []
+    for number in range(1, rounds + 1):
+        calibration, batches = fit_gains(logs, calibration, free)
+        calibration, likelihood = fit_noises(logs, calibration)
+        history.append({"round": number, "log_likelihood": likelihood, **asdict(calibration)})
+        print(f"round {number}: log likelihood {likelihood:.1f}", file=sys.stderr)
+    return {
+        "values": asdict(calibration),
+        "method": " ".join((__doc__ or "").split("\n\n")[2].split()),
+        "evidence": {
+            "truth_used": False,
+            "logs": [_evidence(log, calibration, batch) for log, batch in zip(logs, batches, strict=True)],
+            "rounds": history,
+        },
+    }
+
+
+def _evidence(log: SlamLog, calibration: Calibration, batch: Batch) -> dict[str, Any]:
+    run = run_log(log, calibration, "ekf", SETTINGS)
+    nis = run.seen.nis[run.seen.accepted]
+    error = np.sqrt(np.diag(batch.free_cov))
+    return {
+        "log": log.name,
+        "dropped": dict(log.dropped),
+        "own_gains": {
+            name: [float(getattr(batch.calibration, name)), float(e)]
+            for name, e in zip(batch.free, error, strict=True)
+        },
+        "log_likelihood": log_likelihood(run, field_area(log)),
+        "innovations": len(run.seen.ids),
+        "rejected": run.rejected,
+        "nis_mean_of_2": float(nis.mean()),
+        "nis_quantiles_50_90_99": np.quantile(nis, [0.5, 0.9, 0.99]).tolist(),
+        "repeated_sightings": repeated_sightings(log),
+        "batch_sighting_rms": np.sqrt(np.mean(batch.sightings[batch.used] ** 2, 0)).tolist(),
+        "batch_used_share": float(batch.used.mean()),
+    }
+
+
+def read_logs(name: str) -> list[SlamLog]:
+    """All logs of a set, without truth."""
+    from vslam_ref.datasets import catalogue, mrclam, victoria_park
+
+    if name == "mrclam":
+        folder = mrclam.set_folder(catalogue.require("utias_mrclam"))
+        return [mrclam.read_log(folder, robot) for robot in mrclam.robots(folder)]
+    return [victoria_park.read_log(catalogue.require("victoria_park"))]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Identify a data set and print or write the document."""
+    from vslam_ref.experiments.framework import files
+    from vslam_ref.experiments.framework.results import to_json
+
+    parser = argparse.ArgumentParser(description="find gains and noises of a data set, without its truth")
+    parser.add_argument("dataset", choices=sorted(FREE))
+    parser.add_argument("--write", metavar="FILE", help="write the document here instead of printing it")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    options = parser.parse_args(arguments)
+    found = identify(
+        read_logs(options.dataset), START[options.dataset], FREE[options.dataset], options.rounds
+    )
+    document = {
+        "dataset": options.dataset,
+        "command": f"python -m {__spec__.name} {options.dataset}",
+        **found,
+    }
+    if options.write:
+        files.write_text(Path(options.write), to_json(document))
+    else:
+        print(to_json(document), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,183 @@
+"""What ``vslam-ref run`` leaves: numbers, trajectories, maps, figures and one page that shows them.
+
+::
+
+    OUT/result.json               the numbers that were printed
+    OUT/trajectory_<filter>.csv   time, x, y, theta, sd of each; the run's own frame (start = origin)
+    OUT/map_<filter>.csv          id, x, y, variances and covariance; same frame
+    OUT/map.svg, .png             map and trajectory beside the truth
+    OUT/errors.svg, .png          errors with 3 sigma bands; only where there is truth
+    OUT/report.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.experiments.framework import files
+from vslam_ref.experiments.framework.errors import InputError
+from vslam_ref.experiments.framework.results import to_json
+from vslam_ref.experiments.slam_log.compare import Comparison
+from vslam_ref.geometry import se2, so2
+from vslam_ref.plot.saving import save_figure
+from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
+from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
+
+Array = NDArray[np.float64]
+
+TRAJECTORY = "time_s,x_m,y_m,theta_rad,sd_x_m,sd_y_m,sd_theta_rad"
+MAP = "id,x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2"
+
+UNITS = {"rmse_heading_rad": "rad", "landmarks": "", "nees_mean": "", "rejected": ""}
+WORDS = {
+    "rmse_position_m": "position, aligned",
+    "rmse_position_unaligned_m": "position, not aligned",
+    "rmse_heading_rad": "heading, aligned",
+    "landmarks": "landmarks",
+    "landmark_rmse_m": "landmarks, aligned",
+    "nees_mean": "mean NEES (3 is consistent)",
+    "rejected": "rejected sightings",
+}
+
+
+def check_out(out: str) -> Path:
+    """Return the output folder if it can be made, is empty, or holds an earlier result; else InputError."""
+    path = Path(out)
+    files.require_folder(path.parent)
+    if path.is_file():
+        raise InputError(f"output folder {out!r} is a file: give a folder")
+    if path.is_dir() and any(path.iterdir()) and not (path / "result.json").is_file():
+        raise InputError(f"output folder {out!r} holds other things: give a new or empty one")
+    return path
+
+
+def write_report(out: Path, comparison: Comparison, content: Mapping[str, Any]) -> None:
+    """Write everything into a temporary folder and let it take the place of ``out``."""
+    drawn = {name: drawn_run(run, comparison.source.truth) for name, run in all_runs(comparison).items()}
+    title = comparison.source.log.name
+    truth = comparison.source.truth
+    path = truth_path(truth) if truth is not None else np.zeros((0, 2))
+    marks = truth.landmarks if truth is not None else np.zeros((0, 2))
+    with files.new_folder(out) as folder:
+        (folder / "result.json").write_text(to_json(content), encoding="utf-8", newline="\n")
+        for name, run in all_runs(comparison).items():
+            _write_csv(folder / f"trajectory_{name}.csv", TRAJECTORY, _trajectory(run))
+            _write_csv(folder / f"map_{name}.csv", MAP, _map(run), integers=1)
+        save_figure(map_figure(drawn, path, marks, title), folder, title, "map")
+        errors = error_figure(
+            drawn, f"{title}: errors, not aligned" if _exact(truth) else f"{title}: errors, aligned"
+        )
+        if errors is not None:
+            save_figure(errors, folder, title, "errors")
+        (folder / "report.html").write_text(
+            page(content, title, errors is not None), encoding="utf-8", newline="\n"
+        )
+
+
+def all_runs(comparison: Comparison) -> dict[str, LogRun]:
+    """Filters and, last, the batch solution."""
+    bound = {} if comparison.batch is None else {"batch": comparison.batch}
+    return {**comparison.runs, **bound}
+
+
+def _exact(truth: Truth | None) -> bool:
+    return truth is not None and truth.exact
+
+
+def truth_path(truth: Truth) -> Array:
+    """True positions (N, 2) with a row of NaN where the truth is interrupted."""
+    gaps = np.flatnonzero(np.diff(truth.times) > truth.max_gap) + 1
+    return np.insert(truth.poses[:, :2], gaps, np.nan, axis=0)
+
+
+def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
+    """A run in the world frame: path and map aligned; errors unaligned where the truth is exact."""
+    aligned = place(run, truth, aligned=True) if truth is not None else None
+    T = aligned.T_world_run if aligned is not None else np.zeros(3)
+    shown = place(run, truth, aligned=False) if truth is not None and truth.exact else aligned
+    R = so2.exp(T[2])
+    empty = np.zeros((0, 3))
+    return Drawn(
+        name=run.filter,
+        path=se2.compose(T, run.poses)[:, :2],
+        landmarks=se2.act(T, run.map.mean[0]),
+        landmark_cov=R @ run.map.cov[0] @ R.T,
+        times=shown.times if shown is not None else empty[:, 0],
+        errors=shown.errors if shown is not None else empty,
+        sigmas=np.sqrt(np.einsum("kii->ki", shown.covs)) if shown is not None else empty,
+    )
+
+
+def _trajectory(run: LogRun) -> Array:
+    return np.column_stack([run.times, run.poses, np.sqrt(np.einsum("kii->ki", run.covs))])
+
+
+def _map(run: LogRun) -> Array:
+    cov = run.map.cov[0]
+    return np.column_stack([run.map.ids, run.map.mean[0], cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1]])
+
+
+def _write_csv(path: Path, head: str, rows: Array, integers: int = 0) -> None:
+    """Write numbers that read back to 9 digits; unknown ones are empty fields."""
+    lines = [head]
+    for row in rows.tolist():
+        words = [f"{int(v)}" for v in row[:integers]]
+        words += ["" if np.isnan(v) else f"{v:.9g}" for v in row[integers:]]
+        lines.append(",".join(words))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def number_rows(content: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows of the table of numbers: one row a key, one column a filter."""
+    columns = dict(content["filters"])
+    if content["batch"] is not None:
+        columns["batch"] = content["batch"]
+    rows = []
+    for key in KEYS:
+        unit = UNITS.get(key, "m")
+        label = f"{WORDS[key]} [{unit}]" if unit else WORDS[key]
+        rows.append([label, *(_show(numbers[key]) for numbers in columns.values())])
+    return ["", *columns], rows
+
+
+def _show(value: Any) -> str:
+    if value is None:
+        return "-"
+    return str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
+_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; color: #1b1b1b;
+  background: #fff; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { border: 1px solid #c8c8c8; padding: .3rem .6rem; text-align: right; }
+th:first-child { text-align: left; } th { background: #f3f3f3; } img { max-width: 100%; height: auto; }"""
+
+
+def page(content: Mapping[str, Any], title: str, errors: bool) -> str:
+    """``report.html``: no script, no font, no request except for the figures beside it."""
+    heads, rows = number_rows(content)
+    head = "".join(f'<th scope="col">{escape(h)}</th>' for h in heads)
+    body = "\n".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f"<td>{escape(c)}</td>" for c in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    dropped = ", ".join(f"{n} {what}" for what, n in content["dropped"].items()) or "none"
+    notes = f"{content['sightings']} sightings; dropped by the reader: {dropped}. Reference: {content['truth'] or 'none'}."
+    figure = '<p><img src="errors.svg" alt="Errors with 3 sigma bands"></p>\n' if errors else ""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{escape(title)}</h1>\n<p>{escape(notes)}</p>\n"
+        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"
+        f'<p><img src="map.svg" alt="Map and trajectory beside the truth"></p>\n{figure}'
+        '<p><a href="result.json">result.json</a></p>\n</main>\n</body>\n</html>\n'
+    )

@@ -1,0 +1,113 @@
+"""One step of EKF-SLAM on plain arrays: the whole algorithm on one screen.
+
+::
+
+    x = [x_p, x_m]            P = [[P_pp, P_pm], [P_pm^T, P_mm]]      pose (3 states), map (2 per landmark)
+
+    ekf_predict   x_p <- f(x_p, increment),  P_pp <- F P_pp F^T + G Q G^T,  P_pm <- F P_pm
+    ekf_update    innovation = z - h(x),  H = dh/dx,  then ``landmark_update``
+    ekf_step      one after the other
+
+All functions work in place on a batch of B runs.  :class:`~vslam_ref.filters.ekf_slam.EkfSlam` keeps the
+books around them: which landmark stands in which column, and how a new one enters.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.filters import observation, vehicle
+from vslam_ref.filters.block_covariance import landmark_update
+from vslam_ref.geometry import so2
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@accelerated("slam:ekf_predict")
+def ekf_predict(x_p: Array, P_pp: Array, P_pm: Array, at: Array, ds: Array, dalpha: Array, cov: Array) -> None:
+    """One prediction, in place: pose mean, P_pp <- F P_pp F^T + G Q G^T and P_pm <- F P_pm.
+
+    Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): rows
+    and columns 0 and 1 gain a multiple of row and column 2, and nothing else moves.
+
+    Parameters
+    ----------
+    x_p, P_pp, P_pm : ndarray, shapes (B, 3), (B, 3, 3), (B, 3, M)
+        Changed in place.
+    at : ndarray, shape (B, 2)
+        Heading and distance at which F and G are taken: the estimate and ds, or the truth for the ideal
+        EKF.
+    ds, dalpha, cov : ndarray, shapes (B,), (B,), (B, 2, 2)
+        The increment.
+    """
+    pose, increment = np.zeros((len(at), 3)), np.zeros((len(at), 2))
+    pose[:, 2], increment[:, 0] = at.T
+    _, J_pose, J_inc = vehicle.propagate_with_jacobians(pose, increment)
+    x_p[:, 0] += ds * np.cos(x_p[:, 2])
+    x_p[:, 1] += ds * np.sin(x_p[:, 2])
+    x_p[:, 2] = so2.wrap(x_p[:, 2] + dalpha)
+    P_pp[:] = J_pose @ P_pp @ J_pose.swapaxes(1, 2) + J_inc @ cov @ J_inc.swapaxes(1, 2)
+    P_pm[:, :2] += J_pose[:, :2, 2:] * P_pm[:, 2:]
+
+
+@accelerated("slam:ekf_update")
+def ekf_update(
+    x_p: Array,
+    x_m: Array,
+    P_pp: Array,
+    P_pm: Array,
+    P_mm: Array,
+    columns: IntArray,
+    z: Array,
+    cov_z: Array,
+) -> tuple[Array, Array]:
+    """Update with m landmarks of the map at once, in place, linearised at the estimate.
+
+    Implements :eq:`eq-b21` (B21) and its Jacobians.
+
+    Parameters
+    ----------
+    x_p, x_m, P_pp, P_pm, P_mm : ndarray
+        Shapes (B, 3), (B, M), (B, 3, 3), (B, 3, M), (B, M, M); changed in place.
+    columns : ndarray of int, shape (m,)
+        First map column of each landmark seen.
+    z : ndarray, shape (B, m, 2)
+        Relative Cartesian measurements, metres.
+    cov_z : ndarray, shape (m, 2, 2)
+        Their covariances.
+
+    Returns
+    -------
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted.
+    S : ndarray, shape (B, 2 m, 2 m)
+        Its covariance.
+    """
+    landmarks = np.stack([x_m[:, columns], x_m[:, columns + 1]], -1)
+    H = observation.vehicle_from_world_with_jacobians(x_p[:, None], landmarks)
+    innovation = (z - H.value).reshape(len(z), -1)
+    S = landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z)
+    x_p[:, 2] = so2.wrap(x_p[:, 2])
+    return innovation, S
+
+
+@accelerated("slam:ekf_step")
+def ekf_step(
+    x_p: Array,
+    x_m: Array,
+    P_pp: Array,
+    P_pm: Array,
+    P_mm: Array,
+    ds: Array,
+    dalpha: Array,
+    cov: Array,
+    columns: IntArray,
+    z: Array,
+    cov_z: Array,
+) -> tuple[Array, Array]:
+    """:func:`ekf_predict` by the increment ds, dalpha (B,), cov (B, 2, 2), then :func:`ekf_update`."""
+    ekf_predict(x_p, P_pp, P_pm, np.stack([x_p[:, 2], ds], 1), ds, dalpha, cov)
+    return ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z)

@@ -1,0 +1,59 @@
+"""Differences between the lifted filter and its reduced forms over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from vslam_ref.plot import style
+
+Array = NDArray[np.float64]
+
+_LINES = {
+    "reduced/pose": ("pose, 4 + 2 n states", style.BLUE, "-"),
+    "reduced/covariance": ("its covariance", style.SKY, "--"),
+    "reduced/innovation": ("innovations", style.GREEN, ":"),
+    "reduced-map/pose": ("pose, 4 + 4 n states", style.ORANGE, "-."),
+    "condition broken/pose": ("pose, condition |u| = 1 broken", style.VERMILION, "-"),
+}
+_TITLES = {"first_order": "first-order moments of P0 and U", "gaussian": "exact Gaussian moments"}
+
+
+def reduction_figure(time: Array, gap: Mapping[str, Array], *, bound: float) -> Figure:
+    """Draw the largest absolute difference at each time, both P0 together.
+
+    Parameters
+    ----------
+    time : ndarray, shape (T,)
+        Seconds.
+    gap : mapping of str to ndarray, shape (T,)
+        By ``case/quantity/moments/p0``.
+    bound : float
+        Level to mark.
+    """
+    with style.house_style():
+        figure, panels = style.new_figure(4.9, 2, sharey=True)
+        for axes, (moments, title) in zip(panels, _TITLES.items(), strict=True):
+            for key, (label, colour, line) in _LINES.items():
+                found = [gap[f"{key}/{moments}/{p0}"] for p0 in ("low", "high") if f"{key}/{moments}/{p0}" in gap]
+                if not found:
+                    continue
+                worst = np.maximum.reduce(found)
+                at = np.flatnonzero(worst > 0)  # nothing to draw where two floats agree, or nothing was measured
+                axes.plot(time[at], worst[at], color=colour, ls=line, lw=1.6, label=label)
+            axes.axhline(bound, color=style.BLACK, lw=1.2, ls=(0, (5, 2)))
+            axes.set_yscale("log")
+            axes.set_xlim(time[0], time[-1])
+            axes.set_xlabel("time [s]")
+            axes.set_title(title)
+        panels[0].set_ylabel("largest difference from the lifted form\n[m, rad, or their products]")
+        panels[0].annotate(
+            f"bound {bound:g}", (0.0, bound), xycoords=("axes fraction", "data"), xytext=(4, 4),
+            textcoords="offset points", fontsize=9,
+        )  # fmt: skip
+        handles, labels = panels[1].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    return figure

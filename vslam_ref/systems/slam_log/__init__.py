@@ -1,0 +1,38 @@
+"""EKF-SLAM, IEKF-SLAM and the anchored EKF on recorded logs.
+
+============================  =====================================================================
+module                        holds
+============================  =====================================================================
+``log``                       a log in the house's convention; its truth, apart
+``calibration``               gains, delays and noises of vehicle and sensor
+``timeline``                  the log cut into the steps of a filter
+``runner``                    a filter over a log, with a gate that sees the innovation and S only
+``evaluate``                  errors with and without alignment, NEES
+============================  =====================================================================
+"""
+
+from vslam_ref.systems.slam_log.calibration import Calibration
+from vslam_ref.systems.slam_log.evaluate import KEYS, Placed, place, summary, truth_at
+from vslam_ref.systems.slam_log.log import Drive, Sighting, SlamLog, Truth
+from vslam_ref.systems.slam_log.runner import FILTERS, LogRun, RunSettings, Seen, run_log
+from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
+
+__all__ = [
+    "FILTERS",
+    "KEYS",
+    "Calibration",
+    "Drive",
+    "LogRun",
+    "Placed",
+    "RunSettings",
+    "Seen",
+    "Sighting",
+    "SlamLog",
+    "Timeline",
+    "Truth",
+    "build_timeline",
+    "place",
+    "run_log",
+    "summary",
+    "truth_at",
+]

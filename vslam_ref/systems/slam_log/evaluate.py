@@ -1,0 +1,138 @@
+"""A run of a log beside its truth: errors with and without alignment, and consistency.
+
+SLAM fixes no world frame.  Two ways to put the run's frame into the world are reported:
+
+* *unaligned*: the run's pose at the first moment with truth is put on the true pose.  Nothing later is
+  used, so the covariances mean what they say: NEES and 3 sigma bands are taken here.
+* *aligned*: the rigid motion of least squared position error over the whole run.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.geometry import se2, so2
+from vslam_ref.metrics.alignment import align_rigid, root_mean_square
+from vslam_ref.systems.slam_log.log import Truth
+from vslam_ref.systems.slam_log.runner import LogRun
+
+Array = NDArray[np.float64]
+
+KEYS = (
+    "rmse_position_m",
+    "rmse_position_unaligned_m",
+    "rmse_heading_rad",
+    "landmarks",
+    "landmark_rmse_m",
+    "nees_mean",
+    "rejected",
+)
+"""What :func:`summary` gives, in this order."""
+
+
+class Placed(NamedTuple):
+    """A trajectory in the world, at the times where there is truth.
+
+    Attributes
+    ----------
+    T_world_run : ndarray, shape (3,)
+    times : ndarray, shape (N,)
+    poses : ndarray, shape (N, 3)
+        Estimated, world frame.
+    covs : ndarray, shape (N, 3, 3)
+        In the world frame.
+    truth : ndarray, shape (N, 3)
+    """
+
+    T_world_run: Array
+    times: Array
+    poses: Array
+    covs: Array
+    truth: Array
+
+    @property
+    def errors(self) -> Array:
+        """Estimated less true (x, y, theta), angles wrapped, shape (N, 3)."""
+        e = self.poses - self.truth
+        e[:, 2] = so2.wrap(np.nan_to_num(e[:, 2])) + 0.0 * e[:, 2]
+        return e
+
+    @property
+    def nees(self) -> Array:
+        """Normalised estimation error squared of each, shape (N,); 3 degrees of freedom."""
+        e = self.errors[:, :, None]
+        return np.asarray(np.sum(e * np.linalg.solve(self.covs, e), (1, 2)))
+
+
+def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Where there is truth (N,), and the true poses there (n, 3), interpolated linearly in time."""
+    after = np.clip(np.searchsorted(truth.times, times), 1, len(truth.times) - 1)
+    t0, t1 = truth.times[after - 1], truth.times[after]
+    ok = (times >= t0) & (times <= t1) & (t1 - t0 <= truth.max_gap)
+    after, share = after[ok], ((times - t0) / (t1 - t0))[ok, None]
+    a, b = truth.poses[after - 1], truth.poses[after]
+    step = b - a
+    step[:, 2] = so2.wrap(np.nan_to_num(step[:, 2]))
+    poses = a + share * step
+    known = np.isfinite(poses[:, 2])
+    poses[known, 2] = so2.wrap(poses[known, 2])
+    return ok, poses
+
+
+def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
+    """Put a run into the world.
+
+    Returns None where the truth cannot tell: no overlap in time, or, unaligned, no true heading.
+    """
+    ok, true = truth_at(truth, run.times)
+    poses, covs = run.poses[ok], run.covs[ok]
+    if aligned:
+        if len(true) < 2:
+            return None
+        T = align_rigid(poses[:, :2], true[:, :2])
+    else:
+        if not len(true) or not np.isfinite(true[0, 2]):
+            return None
+        T = se2.compose(true[0], se2.inverse(poses[0]))
+    R = np.eye(3)
+    R[:2, :2] = so2.exp(T[2])
+    return Placed(T, run.times[ok], se2.compose(T, poses), R @ covs @ R.T, true)
+
+
+def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:
+    """Errors (m, 2) of the landmarks that are in both maps, after the motion ``T_world_run``."""
+    true = dict(zip(truth.ids.tolist(), truth.landmarks, strict=True))
+    pairs = [(m, true[i]) for i, m in zip(run.map.ids.tolist(), run.map.mean[0], strict=True) if i in true]
+    if not pairs:
+        return np.zeros((0, 2))
+    mine, theirs = (np.array(side) for side in zip(*pairs, strict=True))
+    return np.asarray(se2.act(T_world_run, mine) - theirs)
+
+
+def summary(run: LogRun, truth: Truth | None) -> dict[str, float | int | None]:
+    """The numbers of :data:`KEYS`; None where there is no truth for one.
+
+    Position and landmark errors are aligned unless the key says otherwise; the heading error is taken
+    after the same alignment; NEES is unaligned, and given only where the truth is exact.
+    """
+    result: dict[str, float | int | None] = dict.fromkeys(KEYS)
+    result["landmarks"] = len(run.map.ids)
+    result["rejected"] = run.rejected
+    if truth is None:
+        return result
+    aligned, unaligned = place(run, truth, aligned=True), place(run, truth, aligned=False)
+    if aligned is not None:
+        result["rmse_position_m"] = root_mean_square(aligned.errors[:, :2])
+        heading = aligned.errors[:, 2]
+        if np.isfinite(heading).any():
+            result["rmse_heading_rad"] = root_mean_square(heading[np.isfinite(heading)])
+        map_errors = landmark_errors(run, truth, aligned.T_world_run)
+        result["landmark_rmse_m"] = root_mean_square(map_errors) if len(map_errors) else None
+    if unaligned is not None:
+        result["rmse_position_unaligned_m"] = root_mean_square(unaligned.errors[:, :2])
+        if truth.exact:
+            result["nees_mean"] = float(np.mean(unaligned.nees))
+    return result
