@@ -87,10 +87,9 @@ def check_jacobian(
     *Complex step:* :math:`J_j = \mathrm{Im} f(x + i h e_j) / h` with h = 1e-100 has no truncation and no
     cancellation; the tolerance is ``roundings`` eps times the largest entry.
 
-    *Central differences:* D(h), D(h/2) and D(h/4), extrapolated twice, are exact up to h^6.  The
-    tolerance is what the last extrapolation changed, which is larger than the error left, plus the
-    rounding of the function values over the smallest step, 4 ``roundings`` eps (max|f| + max |J| |x|) / h: a
-    sound evaluation is exact for an argument that is off by some eps.
+    *Central differences:* D(h), D(h/2), D(h/4), extrapolated twice, are exact up to h^6.  The tolerance is
+    what the last extrapolation changed, more than the error left, plus the rounding of the values over
+    the smallest step, 4 ``roundings`` eps (max|f| + max |J| |x|) / h.
 
     Examples
     --------
@@ -180,9 +179,8 @@ class ConsistencyCheck(NamedTuple):
 def assert_consistent(nees: ArrayLike, dof: int, *, false_alarm: float = 1e-3) -> ConsistencyCheck:
     r"""Fail when the mean NEES of M independent runs lies outside its two-sided band.
 
-    For a consistent filter each :math:`e^T P^{-1} e` is chi-squared with ``dof`` degrees of freedom and their
-    sum is chi-squared with M ``dof``.  The band leaves out ``false_alarm`` / 2 on either side: too
-    small is a failure as well, for then the covariance is larger than the errors.
+    For a consistent filter the sum of M values :math:`e^T P^{-1} e` is chi-squared with M ``dof`` degrees of
+    freedom.  The band leaves out ``false_alarm`` / 2 on either side: too small is a failure as well.
 
     Parameters
     ----------

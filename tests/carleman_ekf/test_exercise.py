@@ -113,7 +113,7 @@ def test_car_and_landmarks_share_one_noise(answer: ModuleType) -> None:
     G = slope(lambda u: by_geometry(state(), *u), np.array([DS, DALPHA]))
     right, found = G @ Q @ G.T, noise_part(answer)
     one, two = LANDMARKS[0], LANDMARKS[1]
-    told = "as in (B17) and (B19) as printed: the cross block has no share of the noise, but one noise moves both"
+    told = "the cross block has no share of the noise, as in the printed (B17), (B19); one noise moves both"
     assert np.any(found[:4, one] != 0.0), f"car and landmark: {told}"
     assert np.any(found[one, two] != 0.0), f"two landmarks: {told}"
     assert np.allclose(found, right, atol=NUMERIC), "a cross block of the noise is wrong"

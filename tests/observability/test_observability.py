@@ -156,7 +156,6 @@ def test_ekf_jacobians_are_those_the_filter_used() -> None:
     slam = EkfSlam(START, P0)
     run = observability.linearise_ekf(slam, steps, len(places))
     P = np.diag([0.3, 0.3, 0.02, *[1e6] * (2 * len(places))])
-    pose = START
     for step, F, H in zip(steps, run.transitions, run.measurements, strict=True):
         # cos and sin of the heading F was taken at, from F itself
         ds = step.increment.ds[0]
@@ -168,7 +167,6 @@ def test_ekf_jacobians_are_those_the_filter_used() -> None:
             K = np.linalg.solve(S, H @ P).T
             I_KH = np.eye(len(P)) - K @ H
             P = I_KH @ P @ I_KH.T + 0.01 * K @ K.T
-    assert pose.shape == (3,)
     assert np.abs(P - slam.blocks.full()[1][0]).max() < 1e-5
 
 

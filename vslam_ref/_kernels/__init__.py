@@ -50,7 +50,9 @@ def _resolve(wanted: str) -> str:
         raise ValueError(f"VSLAM_REF_BACKEND={wanted!r}: must be one of {', '.join(CHOICES)}")
     installed = importlib.util.find_spec("numba") is not None
     if wanted == "numba" and not installed:
-        raise ValueError("VSLAM_REF_BACKEND='numba', but numba is not installed: pip install 'vslam-ref[fast]'")
+        raise ValueError(
+            "VSLAM_REF_BACKEND='numba', but numba is not installed: pip install 'vslam-ref[fast]'"
+        )
     return "numba" if installed and wanted != "numpy" else "numpy"
 
 

@@ -10,8 +10,8 @@ EKF-4 growth of a step from 50 to 200 landmarks, as an exponent
 IM-1  ``import vslam_ref`` against ``import numpy``; first accelerated call with a warm cache
 ===== =========================================================================================
 
-Our step is ``ekf_step`` on plain arrays; what the checks and book-keeping of the class :class:`EkfSlam` cost is
-shown beside it.  filterpy is given the same state, models and measurements, its models written with plain
+Our step is ``ekf_step`` on plain arrays; what the checks and book-keeping of :class:`EkfSlam` cost is shown
+beside it.  filterpy is given the same state, models and measurements, its models written with plain
 floats.  Two ways of using it are timed: one landmark at a time, as its users do (the goal's), and all five
 stacked, which is the mathematics of our update.
 """
@@ -49,7 +49,12 @@ PAPER_POSE_RATIO = 23.05 / 19.26
 GOALS_EKF_1 = {10: 2.0, 20: 2.0, 50: 6.0, 100: 20.0, 200: 30.0}
 GOAL_EKF_1_NUMBA = 50.0
 GOAL_EKF_2, GOAL_EKF_4, GOAL_IMPORT, GOAL_FIRST_CALL = 1.1, 2.1, 1.5, 0.6
-GOALS_EKF_3 = {("numpy", "reduced"): 15.0, ("numba", "reduced"): 4.0, ("numpy", "lifted"): 60.0, ("numba", "lifted"): 20.0}
+GOALS_EKF_3 = {
+    ("numpy", "reduced"): 15.0,
+    ("numba", "reduced"): 4.0,
+    ("numpy", "lifted"): 60.0,
+    ("numba", "lifted"): 20.0,
+}
 
 
 def run(quick: bool = False) -> dict[str, Any]:
@@ -64,7 +69,9 @@ def run(quick: bool = False) -> dict[str, Any]:
     return {"rows": rows, "paper_pose_step_ratio": PAPER_POSE_RATIO, "threads": 1}
 
 
-def _row(goal: str, case: str, backend: str, value: float, unit: str, bound: float | None, below: bool) -> dict[str, Any]:
+def _row(
+    goal: str, case: str, backend: str, value: float, unit: str, bound: float | None, below: bool
+) -> dict[str, Any]:
     met = None if bound is None else (value <= bound if below else value >= bound)
     sign = "<=" if below else ">="
     return {
@@ -193,7 +200,10 @@ def steps(backend: str, quick: bool) -> list[dict[str, Any]]:
     have_peer = importlib.util.find_spec("filterpy") is not None
     for n in SIZES:
         world = _World(n)
-        things: dict[str, Callable[[], object]] = {"ours": array_step(world), "EkfSlam class": class_step(world)}
+        things: dict[str, Callable[[], object]] = {
+            "ours": array_step(world),
+            "EkfSlam class": class_step(world),
+        }
         if have_peer:
             things |= {
                 "filterpy one at a time": filterpy_step(world, False),
@@ -205,7 +215,9 @@ def steps(backend: str, quick: bool) -> list[dict[str, Any]]:
         for way in list(things)[1:]:
             bound = GOALS_EKF_1[n] if backend == "numpy" else GOAL_EKF_1_NUMBA
             bound_here = bound if way == "filterpy one at a time" else None
-            rows.append(_row("EKF-1", f"{way} / ours, n = {n}", backend, result.ratio[way], "x", bound_here, False))
+            rows.append(
+                _row("EKF-1", f"{way} / ours, n = {n}", backend, result.ratio[way], "x", bound_here, False)
+            )
     growth = float(np.log(seconds[200] / seconds[50]) / np.log(4.0))
     rows.append(_row("EKF-4", "exponent of n, 50 to 200", backend, growth, "", GOAL_EKF_4, True))
     return rows
@@ -258,8 +270,12 @@ def study(backend: str, quick: bool) -> list[dict[str, Any]]:
     rows = []
     for form in ("reduced", "lifted"):
         runs = 5 if quick else 50
-        config = StudyConfig(runs=runs, population=runs, control_runs=0, filters=("ekf", "iekf"), iekf_form=form)
-        warm_up = dataclasses.replace(config, runs=2, population=2, field=dataclasses.replace(config.field, laps=1))
+        config = StudyConfig(
+            runs=runs, population=runs, control_runs=0, filters=("ekf", "iekf"), iekf_form=form
+        )
+        warm_up = dataclasses.replace(
+            config, runs=2, population=2, field=dataclasses.replace(config.field, laps=1)
+        )
         run_study(warm_up)
         start = time.perf_counter()
         run_study(config)
@@ -288,16 +304,22 @@ def imports(quick: bool) -> list[dict[str, Any]]:
 
     def seconds(code: str) -> float:
         timed = f"import time; start = time.perf_counter(); {code}; print(time.perf_counter() - start)"
-        return float(subprocess.run([sys.executable, "-c", timed], capture_output=True, text=True, check=True).stdout)
+        return float(
+            subprocess.run([sys.executable, "-c", timed], capture_output=True, text=True, check=True).stdout
+        )
 
     ratios = []
     for _ in range(3 if quick else 9):
         base = seconds("import numpy")
         ratios.append(seconds("import vslam_ref, numpy") / base)
-    rows = [_row("IM-1", "import vslam_ref / import numpy", "-", float(np.median(ratios)), "x", GOAL_IMPORT, True)]
+    rows = [
+        _row("IM-1", "import vslam_ref / import numpy", "-", float(np.median(ratios)), "x", GOAL_IMPORT, True)
+    ]
     if importlib.util.find_spec("numba"):
         call = [sys.executable, "-c", _FIRST_CALL]
         done = [subprocess.run(call, capture_output=True, text=True, check=True).stdout for _ in range(4)]
         first = float(np.median([float(text) for text in done[1:]]))  # the first one may compile
-        rows.append(_row("IM-1", "first accelerated call, warm cache", "numba", first, "s", GOAL_FIRST_CALL, True))
+        rows.append(
+            _row("IM-1", "first accelerated call, warm cache", "numba", first, "s", GOAL_FIRST_CALL, True)
+        )
     return rows

@@ -16,7 +16,9 @@ class Paired(NamedTuple):
     ratio: dict[str, float]
 
 
-def paired(things: Mapping[str, Callable[[], object]], repeats: int = 9, least_seconds: float = 0.02) -> Paired:
+def paired(
+    things: Mapping[str, Callable[[], object]], repeats: int = 9, least_seconds: float = 0.02
+) -> Paired:
     """Time the things in turn, ``repeats`` times; each measurement lasts at least ``least_seconds``.
 
     Parameters
@@ -29,9 +31,7 @@ def paired(things: Mapping[str, Callable[[], object]], repeats: int = 9, least_s
         A quick call is repeated within one measurement until it lasts this long.
     """
     loops = {name: _loops(call, least_seconds) for name, call in things.items()}
-    seconds = {
-        name: [] for name in things
-    }  # type: dict[str, list[float]]
+    seconds = {name: [] for name in things}  # type: dict[str, list[float]]
     for _ in range(repeats):
         for name, call in things.items():
             seconds[name].append(_measure(call, loops[name]))

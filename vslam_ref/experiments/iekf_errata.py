@@ -77,7 +77,10 @@ def simulate(task: Task) -> tuple[Array, Array]:
     noise = run_noise(config.study, False, 0, config.runs)
     sightings = tuple(s for s in world.sightings if s.step <= steps)
     world = world._replace(
-        controls=world.controls[:steps], poses=world.poses[: steps + 1], times=world.times[: steps + 1], sightings=sightings
+        controls=world.controls[:steps],
+        poses=world.poses[: steps + 1],
+        times=world.times[: steps + 1],
+        sightings=sightings,
     )
     noise = noise._replace(controls=noise.controls[:, :steps], sightings=noise.sightings[: len(sightings)])
     p0 = config.study.p0(task.p0)
@@ -105,7 +108,8 @@ def run(config: ErrataConfig, context: RunContext) -> Result:
         series={"time": time, "nees": {key: values.mean(0) for key, values in nees.items()}},
         seed=config.study.seed,
         runs=config.runs,
-        arrays={f"nees/{key}": values for key, values in nees.items()} | {f"z5+z6/{key}": v for key, v in w.items()},
+        arrays={f"nees/{key}": values for key, values in nees.items()}
+        | {f"z5+z6/{key}": v for key, v in w.items()},
         payload=(config, nees, w),
     )
 
@@ -178,15 +182,13 @@ def _inconsistent(name: str, nees: dict[str, Array], rng: np.random.Generator) -
     for p0 in ("low", "high"):
         wrong, right = nees[f"{name}/{p0}"][:, -100:].mean(1), nees[f"corrected/{p0}"][:, -100:].mean(1)
         ratio[p0] = float(wrong.mean() / right.mean())
-        intervals[p0] = bootstrap_interval(
-            np.stack([wrong, right], 1), lambda c: c[:, 0] / c[:, 1], rng
-        )
+        intervals[p0] = bootstrap_interval(np.stack([wrong, right], 1), lambda c: c[:, 0] / c[:, 1], rng)
     low = min(intervals.values())
     return Claim(
         "no-cross-noise",
         "B, eqs. 17 and 19",
-        "B17 and B19 taken literally, without cross covariances of the common noise, make another wrong filter",
-        "mean NEES over the last 100 steps over the corrected filter's, 95 % whole-run interval > 1 at both P0",
+        "B17 and B19 to the letter, without cross covariances of the common noise, are another wrong filter",
+        "NEES of the last 100 steps over the corrected filter's, 95 % whole-run interval > 1 at both P0",
         {"ratio": ratio},
         [float(x) for x in low],
         None,

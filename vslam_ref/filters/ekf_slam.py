@@ -62,7 +62,9 @@ class EkfSlam:
         Take every Jacobian at this truth instead of the estimate: the ideal EKF.
     """
 
-    def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32, truth: Truth | None = None) -> None:
+    def __init__(
+        self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32, truth: Truth | None = None
+    ) -> None:
         x, P = as_batch(mean, cov)
         self.blocks = Blocks(x, P, landmark_states=2, capacity=capacity)
         self._truth = truth
@@ -138,7 +140,9 @@ class EkfSlam:
         b = self.blocks
         B, m = z.shape[:2]
         mean = observation.world_from_vehicle(b.x_p[:, None], z)
-        J = observation.world_from_vehicle_with_jacobians(self._linearisation()[:, None], self._placed_at(ids, z))
+        J = observation.world_from_vehicle_with_jacobians(
+            self._linearisation()[:, None], self._placed_at(ids, z)
+        )
         G = J.J_pose.reshape(B, 2 * m, 3)
         cov = G @ b.P_pp @ G.swapaxes(1, 2)
         noise = J.J_measurement @ cov_z @ J.J_measurement.swapaxes(2, 3)
@@ -152,7 +156,9 @@ class EkfSlam:
         """Relative landmark at which the placement is linearised: measured, or true for the ideal EKF."""
         if self._truth is None:
             return z
-        return observation.vehicle_from_world(self._linearisation()[:, None], self._truth.landmarks[None, ids])
+        return observation.vehicle_from_world(
+            self._linearisation()[:, None], self._truth.landmarks[None, ids]
+        )
 
     def pose(self) -> PoseEstimate:
         """Pose mean (B, 3) and covariance (B, 3, 3), copies."""

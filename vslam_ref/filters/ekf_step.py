@@ -27,7 +27,9 @@ IntArray = NDArray[np.int64]
 
 
 @accelerated("slam:ekf_predict")
-def ekf_predict(x_p: Array, P_pp: Array, P_pm: Array, at: Array, ds: Array, dalpha: Array, cov: Array) -> None:
+def ekf_predict(
+    x_p: Array, P_pp: Array, P_pm: Array, at: Array, ds: Array, dalpha: Array, cov: Array
+) -> None:
     """One prediction, in place: pose mean, P_pp <- F P_pp F^T + G Q G^T and P_pm <- F P_pm.
 
     Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): rows

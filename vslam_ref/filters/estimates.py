@@ -63,7 +63,9 @@ def as_batch(mean: ArrayLike, cov: ArrayLike) -> tuple[Array, Array]:
     x = np.atleast_2d(np.asarray(mean, dtype=np.float64))
     P = np.asarray(cov, dtype=np.float64)
     if x.ndim != 2 or x.shape[1] != 3 or P.shape[-2:] != (3, 3) or P.ndim > 3:
-        raise ValueError(f"start mean {np.shape(mean)} and covariance {P.shape}: need (B, 3) and (3, 3) or (B, 3, 3)")
+        raise ValueError(
+            f"start mean {np.shape(mean)} and covariance {P.shape}: need (B, 3) and (3, 3) or (B, 3, 3)"
+        )
     P = np.broadcast_to(P, (len(x), 3, 3)).copy()
     if not (np.isfinite(x).all() and np.isfinite(P).all()):
         raise ValueError("start mean and covariance must be finite")
@@ -73,12 +75,16 @@ def as_batch(mean: ArrayLike, cov: ArrayLike) -> tuple[Array, Array]:
     return x, P
 
 
-def checked_measurement(ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike, batch: int) -> tuple[IntArray, Array, Array]:
+def checked_measurement(
+    ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike, batch: int
+) -> tuple[IntArray, Array, Array]:
     """Landmark ids (m,), measurements (B, m, 2) and covariances (m, 2, 2), or a ValueError."""
     ids = np.asarray(ids, dtype=np.int64)
     z, cov_z = np.asarray(z, dtype=np.float64), np.asarray(cov_z, dtype=np.float64)
     if ids.ndim != 1 or z.shape != (batch, len(ids), 2):
-        raise ValueError(f"ids {ids.shape} and measurements {z.shape} of {batch} runs: need (m,) and ({batch}, m, 2)")
+        raise ValueError(
+            f"ids {ids.shape} and measurements {z.shape} of {batch} runs: need (m,) and ({batch}, m, 2)"
+        )
     if len(set(ids.tolist())) != len(ids):
         raise ValueError(f"landmark ids {ids.tolist()}: each must appear once in one measurement")
     if cov_z.shape not in ((2, 2), (len(ids), 2, 2)):

@@ -182,6 +182,10 @@ def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: 
     step, direction = u[..., 0] * dt, pose[..., 2] + u[..., 1]
     turn = step * np.sin(u[..., 1]) / wheelbase
     return np.stack(
-        [pose[..., 0] + step * np.cos(direction), pose[..., 1] + step * np.sin(direction), so2.wrap(pose[..., 2] + turn)],
+        [
+            pose[..., 0] + step * np.cos(direction),
+            pose[..., 1] + step * np.sin(direction),
+            so2.wrap(pose[..., 2] + turn),
+        ],
         -1,
     )

@@ -73,7 +73,8 @@ def between(a: ArrayLike, b: ArrayLike) -> Array:
 def act(pose: ArrayLike, x: ArrayLike) -> Array:
     """Apply ``T`` (..., 3) to points ``x`` (..., 2)."""
     pose = np.asarray(pose, dtype=np.float64)
-    return so2.act(pose[..., 2], x) + pose[..., :2]
+    moved: Array = so2.act(pose[..., 2], x) + pose[..., :2]
+    return moved
 
 
 def exp(xi: ArrayLike) -> Array:

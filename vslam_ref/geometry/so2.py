@@ -47,7 +47,8 @@ def exp(phi: ArrayLike) -> Array:
 def log(R: ArrayLike) -> Array:
     """Angle in (-pi, pi] of a rotation matrix, shape (..., 2, 2) -> (...)."""
     R = np.asarray(R, dtype=np.float64)
-    return np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
+    angle: Array = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
+    return angle
 
 
 def act(phi: ArrayLike, x: ArrayLike) -> Array:
@@ -72,4 +73,5 @@ def nearest(M: ArrayLike) -> Array:
     even, odd = M[..., 0, 0] + M[..., 1, 1], M[..., 1, 0] - M[..., 0, 1]
     if np.any(np.hypot(even, odd) == 0.0):
         raise ValueError("nearest rotation undefined: M00 + M11 and M10 - M01 both vanish")
-    return exp(np.arctan2(odd, even))
+    angle: Array = np.arctan2(odd, even)
+    return exp(angle)

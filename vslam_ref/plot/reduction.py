@@ -38,11 +38,15 @@ def reduction_figure(time: Array, gap: Mapping[str, Array], *, bound: float) -> 
         figure, panels = style.new_figure(4.9, 2, sharey=True)
         for axes, (moments, title) in zip(panels, _TITLES.items(), strict=True):
             for key, (label, colour, line) in _LINES.items():
-                found = [gap[f"{key}/{moments}/{p0}"] for p0 in ("low", "high") if f"{key}/{moments}/{p0}" in gap]
+                found = [
+                    gap[f"{key}/{moments}/{p0}"] for p0 in ("low", "high") if f"{key}/{moments}/{p0}" in gap
+                ]
                 if not found:
                     continue
                 worst = np.maximum.reduce(found)
-                at = np.flatnonzero(worst > 0)  # nothing to draw where two floats agree, or nothing was measured
+                at = np.flatnonzero(
+                    worst > 0
+                )  # nothing to draw where two floats agree, or nothing was measured
                 axes.plot(time[at], worst[at], color=colour, ls=line, lw=1.6, label=label)
             axes.axhline(bound, color=style.BLACK, lw=1.2, ls=(0, (5, 2)))
             axes.set_yscale("log")

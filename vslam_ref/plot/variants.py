@@ -47,7 +47,11 @@ def variants_figure(
             axes.set_title(style.P0_TITLES[p0])
         panels[0].set_ylabel(f"mean NEES of {runs} runs (3 dof, no unit)")
         panels[0].annotate(
-            f"{broken:g}", (0.0, broken), xycoords=("axes fraction", "data"), xytext=(4, 3), textcoords="offset points"
+            f"{broken:g}",
+            (0.0, broken),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 3),
+            textcoords="offset points",
         )
         panels[0].annotate(
             "3 = consistent", (1.0, 3.0), xycoords=("axes fraction", "data"), xytext=(-4, -12),

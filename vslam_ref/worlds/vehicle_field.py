@@ -1,13 +1,13 @@
-"""A vehicle on a square course among point landmarks, with exact truth (seed B, section 4.1).
+r"""A vehicle on a square course among point landmarks, with exact truth (seed B, section 4.1).
 
 ::
 
         +-----------------+        a square of the given side, corners rounded;
-       /                   \\       the true path is B4 itself, noise-free: one lap closes
+       /                   \       the true path is B4 itself, noise-free: one lap closes
       |   .        .        |      to rounding, and every lap is the same
       |       .        .    |
       |  .        o-->      |      landmarks uniform in a square; seen within max_range at
-       \\       .           /       every measurement period, the identity of each known
+       \       .           /       every measurement period, the identity of each known
         +-----------------+
 
 What is random in one run: the start estimate, drawn from P0; the control noise; the measurement
@@ -29,7 +29,7 @@ IntArray = NDArray[np.int64]
 
 
 def _assume(default: float, unit: str, reason: str) -> float:
-    return field(default=default, metadata={"unit": unit, "reason": reason})  # type: ignore[no-any-return]
+    return field(default=default, metadata={"unit": unit, "reason": reason})
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,8 @@ class VehicleFieldConfig:
 
     def __post_init__(self) -> None:
         """Refuse values no world can be built from."""
-        positive = ("side", "lap_seconds", "corner_radius", "dt", "wheelbase", "landmark_half_width")
-        positive += ("measurement_period", "max_range", "sigma_z")
-        for name in (*positive, "laps", "landmarks"):
+        lengths = ("side", "corner_radius", "wheelbase", "landmark_half_width", "max_range", "sigma_z")
+        for name in (*lengths, "lap_seconds", "dt", "measurement_period", "laps", "landmarks"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must be > 0")
         for name in ("sigma_v", "sigma_phi"):
@@ -152,14 +151,14 @@ def make_field(config: VehicleFieldConfig, rng: np.random.Generator) -> VehicleF
     """Build the course, draw the landmarks and list what is seen when."""
     poses, controls = course(config)
     w = config.landmark_half_width
-    landmarks = rng.uniform(-w, w, (config.landmarks, 2))
+    landmarks: Array = rng.uniform(-w, w, (config.landmarks, 2))
     sightings = []
     for step in range(0, config.steps + 1, config.measurement_steps):
         z = observation.vehicle_from_world(poses[step], landmarks)
         ids = np.flatnonzero(np.hypot(z[:, 0], z[:, 1]) <= config.max_range)
         if len(ids):
             sightings.append(Sighting(step, ids, z[ids]))
-    times = config.dt * np.arange(config.steps + 1)
+    times: Array = config.dt * np.arange(config.steps + 1, dtype=np.float64)
     return VehicleField(config, times, poses, controls, landmarks, tuple(sightings))
 
 

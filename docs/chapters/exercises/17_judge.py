@@ -1,4 +1,4 @@
-"""Exercise 17.1: is a filter consistent?"""
+"""Exercise 17.1: judge whether a filter is consistent."""
 
 import numpy as np
 

@@ -1,9 +1,9 @@
-"""Solution of exercise 17.1: is a filter consistent?
+"""Solution of exercise 17.1: judge whether a filter is consistent.
 
-One time, fixed beforehand: the last, where a fault has had the longest time to show.  There the M values are
-independent, and for a consistent filter their sum is chi-squared with M dof degrees of freedom.  That is exact,
-however the errors correlate in time, because no second time is looked at.  Two tails: too careful is a
-fault as well.
+One time, fixed beforehand: the last, where a fault has had the longest time to show.  There the M
+values are independent, and for a consistent filter their sum is chi-squared with M dof degrees of
+freedom.  That is exact, however the errors correlate in time, because no second time is looked at.
+Two tails: too careful is a fault as well.
 """
 
 import numpy as np

@@ -43,10 +43,12 @@ class StudyConfig:
 
     field: VehicleFieldConfig = dataclasses.field(default_factory=VehicleFieldConfig)
     p0_low: tuple[float, float, float] = dataclasses.field(
-        default=(1.0, 1.0, 0.001), metadata={"unit": "m2, m2, rad2", "reason": "B§4.1: low initial uncertainty"}
+        default=(1.0, 1.0, 0.001),
+        metadata={"unit": "m2, m2, rad2", "reason": "B§4.1: low initial uncertainty"},
     )
     p0_high: tuple[float, float, float] = dataclasses.field(
-        default=(1.0, 1.0, 0.03), metadata={"unit": "m2, m2, rad2", "reason": "B§4.1: high initial uncertainty"}
+        default=(1.0, 1.0, 0.03),
+        metadata={"unit": "m2, m2, rad2", "reason": "B§4.1: high initial uncertainty"},
     )
     runs: int = dataclasses.field(default=50, metadata={"reason": "B§4.1: 50 Monte Carlo runs"})
     population: int = dataclasses.field(
@@ -63,7 +65,8 @@ class StudyConfig:
         metadata={"reason": "B's two; two controls that tell what the inconsistency comes from"},
     )
     iekf_form: str = dataclasses.field(
-        default="reduced", metadata={"reason": "same pose estimates as the lifted form (iekf-reduced shows it)"}
+        default="reduced",
+        metadata={"reason": "same pose estimates as the lifted form (iekf-reduced shows it)"},
     )
     iekf_start: str = dataclasses.field(
         default="first_order", metadata={"reason": "not given; Jacobian and exact moments differ little"}
@@ -71,13 +74,17 @@ class StudyConfig:
     iekf_control: str = dataclasses.field(
         default="first_order", metadata={"reason": "not given; keeps (u2, u3) on the unit circle"}
     )
-    batch: int = dataclasses.field(default=50, metadata={"reason": "runs computed together; part of the numbers' bytes"})
+    batch: int = dataclasses.field(
+        default=50, metadata={"reason": "runs computed together; part of the numbers' bytes"}
+    )
     seed: int = dataclasses.field(default=2016, metadata={"reason": "B's year; chosen before it was run"})
 
     def __post_init__(self) -> None:
         """Refuse studies that mean nothing."""
         if not 2 <= self.runs <= self.population:
-            raise ValueError(f"runs={self.runs}: must be at least 2 and at most the population {self.population}")
+            raise ValueError(
+                f"runs={self.runs}: must be at least 2 and at most the population {self.population}"
+            )
         if self.batch < 1 or self.control_runs < 0:
             raise ValueError(f"batch={self.batch} must be >= 1, control_runs={self.control_runs} >= 0")
         if not 0 < self.control_scale <= 1:
@@ -100,11 +107,11 @@ class Task(NamedTuple):
     filter: str
     p0: str
     first: int
-    count: int
+    size: int
 
 
 class RunArrays(NamedTuple):
-    """Per run: NEES (M, T + 1), position error (M, T + 1) in m, heading error in rad, NIS per number (M, K)."""
+    """Per run: NEES (M, T + 1), position error in m and heading error in rad likewise, NIS per number (M, K)."""
 
     nees: Array
     position_error: Array
@@ -126,7 +133,9 @@ class StudyResult(NamedTuple):
 class Mapper(Protocol):
     """How tasks are carried out: the experiment framework's ``RunContext`` is one."""
 
-    def map(self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = "") -> list[RunArrays]:
+    def map(
+        self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = ""
+    ) -> list[RunArrays]:
         """Results in the order of the tasks."""
 
 
@@ -157,7 +166,7 @@ def simulate(task: Task) -> RunArrays:
     """Run one filter over one batch of runs."""
     config, control = task.config, task.filter == "control"
     world = study_field(config)
-    noise = run_noise(config, control, task.first, task.count)
+    noise = run_noise(config, control, task.first, task.size)
     scale = config.control_scale if control else 1.0
     p0 = config.p0(task.p0) * scale**2
     start = world.poses[0] + noise.start * np.sqrt(p0)
@@ -218,7 +227,9 @@ def tasks_of(config: StudyConfig) -> list[Task]:
 
 
 class _InProcess:
-    def map(self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = "") -> list[RunArrays]:
+    def map(
+        self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = ""
+    ) -> list[RunArrays]:
         return [function(task) for task in batches]
 
 

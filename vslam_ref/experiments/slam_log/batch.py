@@ -42,6 +42,8 @@ STEPS = {
     "range_cosine": 1e-3,
 }
 """Calibration values that can be unknowns, and the step of their numeric derivatives."""
+SENSOR_ONLY = ("sensor_ahead", "bearing_offset", "range_offset", "range_cosine")
+"""Those that say nothing about odometry."""
 
 
 class Batch(NamedTuple):
@@ -88,13 +90,20 @@ class _Problem:
 
     def __init__(self, log: SlamLog, free: Sequence[str], gate: float) -> None:
         self.log, self.free, self.gate = log, tuple(free), gate
+        self._kept: tuple[Calibration, RelativePoses, Array] | None = None
         self.node = np.repeat(np.arange(len(log.sightings)), [len(s.ids) for s in log.sightings])
         all_ids = np.concatenate([s.ids for s in log.sightings])
         self.ids, self.landmark = np.unique(all_ids, return_inverse=True)
         self.polar = np.concatenate([s.polar for s in log.sightings])
 
     def odometry(self, calibration: Calibration) -> tuple[RelativePoses, Array]:
-        """Odometry between sightings and the inverse Cholesky factors of its covariance."""
+        """Odometry between sightings and the inverse Cholesky factors of its covariance; the last kept."""
+        key = replace(calibration, **dict.fromkeys(SENSOR_ONLY, 0.0))
+        if self._kept is None or self._kept[0] != key:
+            self._kept = (key, *self._odometry(calibration))
+        return self._kept[1:]
+
+    def _odometry(self, calibration: Calibration) -> tuple[RelativePoses, Array]:
         line = build_timeline(self.log, calibration, np.zeros(0))
         relative = preintegrate(line, line.sighting_at)
         floor = np.diag([1e-4, 1e-4, 1e-4]) ** 2  # a vehicle at rest would have none at all

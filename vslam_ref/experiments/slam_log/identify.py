@@ -2,7 +2,7 @@
 
     python -m vslam_ref.experiments.slam_log.identify mrclam          # prints; --write FILE writes
 
-Two steps are repeated ``ROUNDS`` times, on all logs of the set together:
+Two steps are repeated, on all logs of the set together, with an ever narrower gate:
 
 1. *gains and offsets*: a batch solution of each log with these values unknown.  A robot that sees one
    landmark twice, with a turn and a way in between, has measured its own odometry.  The logs'
@@ -45,11 +45,22 @@ FREE = {
 """Gains and offsets each set lets vary."""
 
 START = {
-    "mrclam": Calibration(sighting_delay=0.2, range_cosine=1.0, sigma_bearing=0.006),
+    "mrclam": Calibration(
+        sighting_delay=0.2,
+        range_cosine=1.0,
+        sigma_distance=0.1,
+        sigma_turn=0.15,
+        sigma_drift=0.06,
+        sigma_range=0.1,
+        sigma_bearing=0.015,
+    ),
     "victoria_park": Calibration(sensor_ahead=3.78, sigma_range=0.3),
 }
 OUTLIERS = 0.01
-ROUNDS = 3
+GATES = (60.0, 25.0, 13.816)
+"""One round each: wide while the values are still far off, at last that of a run."""
+STRIDES = (0.5, 0.3, 0.15)
+"""Of the logarithms of the sigmas, one sweep each."""
 SETTINGS = RunSettings(max_step=0.1, start_sigma_position=0.0, start_sigma_heading=0.0)
 """Faster than odometry rate; the start is the frame, so it is certain."""
 
@@ -76,38 +87,52 @@ def pooled_gains(batches: Sequence[Batch]) -> tuple[Array, Array]:
 
 
 def fit_gains(
-    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str]
+    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str], settings: RunSettings
 ) -> tuple[Calibration, list[Batch]]:
     """Step 1: one batch solution per log, free values averaged."""
     batches = []
     for log in logs:
-        start = run_log(log, calibration, "ekf", SETTINGS)
-        batches.append(solve_batch(log, calibration, start, free))
+        start = run_log(log, calibration, "ekf", settings)
+        batches.append(solve_batch(log, calibration, start, free, settings.gate))
     values, _ = pooled_gains(batches)
     return replace(calibration, **dict(zip(free, values.tolist(), strict=True))), batches
 
 
 def fit_noises(
-    logs: Sequence[SlamLog], calibration: Calibration, iterations: int = 12
+    logs: Sequence[SlamLog], calibration: Calibration, settings: RunSettings
 ) -> tuple[Calibration, float]:
-    """Step 2: the most likely sigmas, by a quasi-Newton search in their logarithms."""
-    from scipy.optimize import minimize
+    """Step 2: the most likely sigmas, by parabolas through three values of each logarithm in turn.
 
+    The gate makes small steps in the likelihood; a parabola through points ``STRIDES`` apart looks past
+    them, where a gradient would not.
+    """
     areas = [field_area(log) for log in logs]
-    start = np.log([getattr(calibration, name) for name in NOISES])
 
-    def at(x: Array) -> Calibration:
-        return replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True)))
+    def likelihood(x: Array) -> float:
+        trial = replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True)))
+        runs = (run_log(log, trial, "ekf", settings) for log in logs)
+        return sum(log_likelihood(run, area) for run, area in zip(runs, areas, strict=True))
 
-    def cost(x: Array) -> float:
-        runs = (run_log(log, at(x), "ekf", SETTINGS) for log in logs)
-        return -sum(log_likelihood(run, area) for run, area in zip(runs, areas, strict=True))
+    x = np.log([getattr(calibration, name) for name in NOISES])
+    best = likelihood(x)
+    for stride in STRIDES:
+        for i in range(len(x)):
+            unit = np.eye(len(x))[i]
+            low, high = likelihood(x - stride * unit), likelihood(x + stride * unit)
+            move = _summit(low, best, high) * stride
+            value = likelihood(x + move * unit)
+            candidates = {best: 0.0, low: -stride, high: stride, value: move}
+            best = max(candidates)
+            x = x + candidates[best] * unit
+    return replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True))), best
 
-    # gated sightings make steps in the likelihood: differences over 3 % look past them
-    bounds = [(s - 1.5, s + 1.5) for s in start]
-    options = {"maxiter": iterations, "eps": 0.03, "ftol": 1e-6}
-    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=options)
-    return at(found.x), -float(found.fun)
+
+def _summit(low: float, middle: float, high: float) -> float:
+    """Where a parabola through values at -1, 0, 1 is highest, held to [-2, 2]; the better side if none."""
+    curvature = low - 2 * middle + high
+    if curvature >= 0:
+        return 2.0 if high > low else -2.0
+    return float(np.clip((low - high) / (2 * curvature), -2.0, 2.0))
 
 
 def repeated_sightings(log: SlamLog, within: float = 0.5) -> dict[str, float | int]:
@@ -132,17 +157,18 @@ def repeated_sightings(log: SlamLog, within: float = 0.5) -> dict[str, float | i
 
 
 def identify(
-    logs: Sequence[SlamLog], start: Calibration, free: Sequence[str], rounds: int = ROUNDS
+    logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]
 ) -> dict[str, Any]:
     """Alternate the two steps; returns the document that is committed."""
     calibration = start
     history = []
     batches: list[Batch] = []
-    for number in range(1, rounds + 1):
-        calibration, batches = fit_gains(logs, calibration, free)
-        calibration, likelihood = fit_noises(logs, calibration)
-        history.append({"round": number, "log_likelihood": likelihood, **asdict(calibration)})
-        print(f"round {number}: log likelihood {likelihood:.1f}", file=sys.stderr)
+    for number, gate in enumerate(GATES, 1):
+        settings = replace(SETTINGS, gate=gate)
+        calibration, batches = fit_gains(logs, calibration, free, settings)
+        calibration, likelihood = fit_noises(logs, calibration, settings)
+        history.append({"gate": gate, "log_likelihood": likelihood, **asdict(calibration)})
+        print(f"round {number} of {len(GATES)}: log likelihood {likelihood:.1f}", file=sys.stderr)
     return {
         "values": asdict(calibration),
         "method": " ".join((__doc__ or "").split("\n\n")[2].split()),
@@ -194,11 +220,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="find gains and noises of a data set, without its truth")
     parser.add_argument("dataset", choices=sorted(FREE))
     parser.add_argument("--write", metavar="FILE", help="write the document here instead of printing it")
-    parser.add_argument("--rounds", type=int, default=ROUNDS)
     options = parser.parse_args(arguments)
-    found = identify(
-        read_logs(options.dataset), START[options.dataset], FREE[options.dataset], options.rounds
-    )
+    found = identify(read_logs(options.dataset), START[options.dataset], FREE[options.dataset])
     document = {
         "dataset": options.dataset,
         "command": f"python -m {__spec__.name} {options.dataset}",

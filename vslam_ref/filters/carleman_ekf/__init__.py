@@ -58,4 +58,6 @@ def carleman_ekf(
         raise ValueError(f"form={form!r}: must be one of {', '.join(FORMS)}")
     if form == "lifted":
         return LiftedCarlemanEkf(mean, cov, capacity, start=start, control=control)
-    return ReducedCarlemanEkf(mean, cov, capacity, start=start, control=control, with_map=form == "reduced-map")
+    return ReducedCarlemanEkf(
+        mean, cov, capacity, start=start, control=control, with_map=form == "reduced-map"
+    )

@@ -142,7 +142,9 @@ def measurement_matrix(slots: ArrayLike, landmarks: int) -> Array:
     return H.reshape(2 * len(slots), H.shape[2])
 
 
-def placement_matrices(z_R: Array, measurement: Array, variant: Variant = AS_CORRECTED) -> tuple[Array, Array]:
+def placement_matrices(
+    z_R: Array, measurement: Array, variant: Variant = AS_CORRECTED
+) -> tuple[Array, Array]:
     """Matrices of a new landmark: G_3 in the vehicle states and G_new in the measurement.
 
     Implements :eq:`eq-b26` (B26) and the Jacobians of :eq:`eq-b28` (B28).
@@ -162,7 +164,14 @@ def placement_matrices(z_R: Array, measurement: Array, variant: Variant = AS_COR
     """
     sign = -1.0 if variant.b26_as_printed else 1.0
     # rows of B26 as (state of x_new, state of y_new, its sign, state without factor), states from 1
-    rows = ((4, 3, -1.0, 1), (3, 4, 1.0, 2), (11, 5, -1.0, 7), (6, 11, -1.0, 8), (5, 11, sign, 9), (11, 6, 1.0, 10))
+    rows = (
+        (4, 3, -1.0, 1),
+        (3, 4, 1.0, 2),
+        (11, 5, -1.0, 7),
+        (6, 11, -1.0, 8),
+        (5, 11, sign, 9),
+        (11, 6, 1.0, 10),
+    )
     G_3 = np.zeros((*measurement.shape[:-1], LANDMARK, VEHICLE))
     G_new = np.zeros((*measurement.shape[:-1], LANDMARK, 2))
     for i, (of_x, of_y, sign_y, alone) in enumerate(rows):

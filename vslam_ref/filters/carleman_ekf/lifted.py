@@ -103,7 +103,9 @@ class LiftedCarlemanEkf:
     def _noise_factor(self, factor: Array) -> Array:
         """J_U sqrt(Q_U), shape (B, 11 + 6 n, r): each monomial's matrix applied to the mean."""
         z = self._z[:, : self.size]
-        matrices = lift.LANDMARK_MATRICES_AS_PRINTED if self.variant.b18_as_printed else lift.LANDMARK_MATRICES
+        matrices = (
+            lift.LANDMARK_MATRICES_AS_PRINTED if self.variant.b18_as_printed else lift.LANDMARK_MATRICES
+        )
         J_R = np.einsum("kij,bj->bik", lift.VEHICLE_MATRICES[1:], z[:, _R])
         landmarks = z[:, _L].reshape(len(z), -1, lift.LANDMARK)
         J_L = np.einsum("kij,bnj->bnik", matrices[1:], landmarks).reshape(len(z), -1, len(lift.MONOMIALS) - 1)

@@ -73,7 +73,7 @@ def _shifted(p: int, q: int, k: int, mean: Array, cov: Array) -> NDArray[np.comp
     if p + q == 0:
         return np.ones(len(mean), dtype=np.complex128)
     at = 0 if p else 1
-    return mean[:, at] + 1j * k * cov[:, at, 2]  # type: ignore[no-any-return]
+    return mean[:, at] + 1j * k * cov[:, at, 2]
 
 
 def _covariance_of(f: tuple[Term, ...], g: tuple[Term, ...], mean: Array, cov: Array) -> Array:
@@ -98,7 +98,9 @@ def _covariance_of(f: tuple[Term, ...], g: tuple[Term, ...], mean: Array, cov: A
     return total.real
 
 
-def _gaussian_moments(functions: tuple[tuple[Term, ...], ...], mean: Array, cov: Array) -> tuple[Array, Array]:
+def _gaussian_moments(
+    functions: tuple[tuple[Term, ...], ...], mean: Array, cov: Array
+) -> tuple[Array, Array]:
     """Exact mean (B, f) and covariance (B, f, f) of f functions of a Gaussian (x, y, theta)."""
     first = np.stack([_mean_of(f, mean, cov) for f in functions], -1)
     second = np.empty((len(mean), len(functions), len(functions)))

@@ -24,6 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.filters.block_covariance import Blocks, landmark_update
+from vslam_ref.filters.carleman_ekf.reduced_moments import (
+    control_first_order,
+    control_gaussian,
+    start_moments,
+)
 from vslam_ref.filters.estimates import (
     Innovation,
     MapEstimate,
@@ -37,81 +42,6 @@ from vslam_ref.filters.vehicle import Increment
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
-
-
-def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
-    """Mean (B, 4) and covariance (B, 4, 4) of (x, y, sin, cos) for a pose N(mean (B, 3), cov (B, 3, 3)).
-
-    ``first_order``: by the Jacobian.  ``gaussian``: with v the heading's variance and k the covariance
-    of position and heading, E[h] = e^{i theta - v/2}, cov(position, h) = i k E[h], E[h h] = e^{2i theta - 2v}.
-    """
-    x, y, theta = mean.T
-    s, c = np.sin(theta), np.cos(theta)
-    if kind == "first_order":
-        J = np.zeros((len(mean), 4, 3))
-        J[:, 0, 0] = J[:, 1, 1] = 1.0
-        J[:, 2, 2], J[:, 3, 2] = c, -s
-        return np.stack([x, y, s, c], -1), J @ cov @ J.swapaxes(1, 2)
-    if kind != "gaussian":
-        raise ValueError(f"start={kind!r}: must be 'first_order' or 'gaussian'")
-    v = cov[:, 2, 2]
-    shrink = np.exp(-v / 2)
-    P = np.zeros((len(mean), 4, 4))
-    P[:, :2, :2] = cov[:, :2, :2]
-    P[:, :2, 2] = P[:, 2, :2] = cov[:, :2, 2] * (shrink * c)[:, None]
-    P[:, :2, 3] = P[:, 3, :2] = -cov[:, :2, 2] * (shrink * s)[:, None]
-    # var sin, var cos and cov from E[hh] and |h| = 1; -expm1 keeps the digits of a small variance
-    even, odd = -np.expm1(-v) / 2, shrink**2 * np.expm1(-v) / 2
-    P[:, 2, 2] = even * (1.0 + shrink**2 * np.cos(2 * theta))
-    P[:, 3, 3] = even * (1.0 - shrink**2 * np.cos(2 * theta))
-    P[:, 2, 3] = P[:, 3, 2] = odd * np.sin(2 * theta)
-    return np.stack([x, y, shrink * s, shrink * c], -1), P
-
-
-def control_first_order(increment: Increment) -> tuple[Array, Array]:
-    """Mean (B, 5) and covariance (B, 5, 5) of (ds, Re m, Im m, Re t, Im t), to first order.
-
-    dm = -i m dalpha and dt = m dds - i t dalpha.
-    """
-    m = np.exp(-1j * increment.dalpha)
-    t = increment.ds * m
-    mean, J = np.empty((len(m), 5)), np.zeros((len(m), 5, 2))
-    mean[:, 0], mean[:, 1], mean[:, 2], mean[:, 3], mean[:, 4] = increment.ds, m.real, m.imag, t.real, t.imag
-    J[:, 0, 0], J[:, 3:, 0] = 1.0, mean[:, 1:3]
-    J[:, 1::2, 1], J[:, 2::2, 1] = mean[:, 2::2], -mean[:, 1::2]
-    return mean, J @ increment.cov @ J.swapaxes(1, 2)
-
-
-def control_gaussian(increment: Increment) -> tuple[Array, Array]:
-    """As :func:`control_first_order`, exact for Gaussian (ds, dalpha).
-
-    With d, a the means, s2 the variance of ds, v that of dalpha and k their covariance,
-    E[ds^p e^{-ija}] is e^{-ija - j^2 v/2} times the p-th moment of N(d - ijk, s2).  Below, E[m] and the
-    like are divided out, so that no difference of nearly equal numbers is left.
-    """
-    d, s2, k, v = increment.ds, increment.cov[:, 0, 0], increment.cov[:, 0, 1], increment.cov[:, 1, 1]
-    m = np.exp(-1j * increment.dalpha - v / 2)
-    t = (d - 1j * k) * m
-    less, keep = np.expm1(-v), np.exp(-v)
-    plain_mm, conj_mm = less, -less
-    plain_tm, conj_tm = (d - 2j * k) * less - 1j * k, 1j * k * keep - d * less
-    plain_tt = ((d - 2j * k) ** 2 + s2) * less + s2 - 2j * d * k - 3 * k**2
-    conj_tt = s2 - d**2 * less - k**2 * keep
-    C = np.zeros((len(d), 5, 5))
-    C[:, 0, 0] = s2
-    for at, cross in ((1, -1j * k * m), (3, (s2 - 1j * k * (d - 1j * k)) * m)):
-        C[:, 0, at] = C[:, at, 0] = cross.real
-        C[:, 0, at + 1] = C[:, at + 1, 0] = cross.imag
-    for i, j, plain, conj in ((1, 1, plain_mm, conj_mm), (3, 1, plain_tm, conj_tm), (3, 3, plain_tt, conj_tt)):
-        C[:, i : i + 2, j : j + 2] = _real_covariance(plain * m * m, conj + 0j)
-        C[:, j : j + 2, i : i + 2] = C[:, i : i + 2, j : j + 2].swapaxes(1, 2)
-    return np.stack([d, m.real, m.imag, t.real, t.imag], -1), C
-
-
-def _real_covariance(plain: Complex, conj: Complex) -> Array:
-    """Covariance (B, 2, 2) of (Re f, Im f) with (Re g, Im g), from cov(f, g) and cov(f, conj g)."""
-    rows = [[plain.real + conj.real, plain.imag - conj.imag], [plain.imag + conj.imag, conj.real - plain.real]]
-    return np.array(rows).transpose(2, 0, 1) / 2
 
 
 _CONTROL = ("first_order", "gaussian")
@@ -143,7 +73,7 @@ def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array)
     frame[:, 3] *= m.conj()
 
 
-@accelerated("slam:reduced_predict")
+@accelerated("reduced:reduced_predict")
 def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
     """One prediction, in place, without touching a landmark.
 
@@ -162,7 +92,7 @@ def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov:
     _predict(x_p, P_a, frame, control, cov)
 
 
-@accelerated("slam:reduced_predict_first_order")
+@accelerated("reduced:reduced_predict_first_order")
 def reduced_predict_first_order(
     x_p: Array, P_a: Array, frame: Complex, ds: Array, dalpha: Array, cov: Array
 ) -> None:
@@ -170,7 +100,7 @@ def reduced_predict_first_order(
     _predict(x_p, P_a, frame, *control_first_order(Increment(ds, dalpha, cov)))
 
 
-@accelerated("slam:reduced_apply")
+@accelerated("reduced:reduced_apply")
 def reduced_apply(x_m: Array, P_pm: Array, P_mm: Array, b: int, P_a: Array, frame: Complex) -> None:
     """Apply the accumulated transition and noise to the map blocks, in place, and start afresh.
 
@@ -252,7 +182,7 @@ class ReducedCarlemanEkf:
         return seen
 
     def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
-        """z = c rho - tau + noise: the reduced :eq:`eq-b22` (B22)."""
+        """Use z = c rho - tau + noise: the reduced :eq:`eq-b22` (B22)."""
         b = self.blocks
         columns = b.columns(ids)
         c, tau = self._frame[:, 0:1], self._frame[:, 1:2]
@@ -275,16 +205,16 @@ class ReducedCarlemanEkf:
         mean, J_z = np.zeros((B, m, b.b)), np.zeros((B, m, b.b, 2))
         mean[..., 0], mean[..., 1] = rho.real, rho.imag
         J_z[:, :, :2] = _as_matrix(1 / c)
-        G = np.zeros((B, m, b.b, 4))
+        J_pose = np.zeros((B, m, b.b, 4))
         if self.with_map:
             h = b.x_p[:, 3:4] + 1j * b.x_p[:, 2:3]
             place = b.x_p[:, 0:1] + 1j * b.x_p[:, 1:2] + h * zc
             mean[..., 2], mean[..., 3] = place.real, place.imag
             J_z[:, :, 2:] = _as_matrix(h)
-            G[:, :, 2, 0] = G[:, :, 3, 1] = 1.0
-            G[:, :, 2, 2], G[:, :, 2, 3] = -z[..., 1], z[..., 0]
-            G[:, :, 3, 2], G[:, :, 3, 3] = z[..., 0], z[..., 1]
-        G = G.reshape(B, m * b.b, 4)
+            J_pose[:, :, 2, 0] = J_pose[:, :, 3, 1] = 1.0
+            J_pose[:, :, 2, 2], J_pose[:, :, 2, 3] = -z[..., 1], z[..., 0]
+            J_pose[:, :, 3, 2], J_pose[:, :, 3, 3] = z[..., 0], z[..., 1]
+        G = J_pose.reshape(B, m * b.b, 4)
         cov = G @ b.P_pp @ G.swapaxes(1, 2)
         noise = J_z @ cov_z @ J_z.swapaxes(2, 3)
         for j in range(m):
