@@ -32,6 +32,7 @@ exclude_patterns = ["_build", "_tools", "chapters/exercises", "chapters/solution
 # The pages were executed by docs/_tools/notebooks.py; here they are only rendered.
 nb_execution_mode = "off"
 nb_merge_streams = True
+nb_render_markdown_format = "myst"  # tables that a cell makes
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 3
 

@@ -8,8 +8,8 @@ function                      fails when
 :func:`assert_group_axioms`   a module of group functions is not a group of matrices
 ============================  =====================================================================
 
-Every tolerance is derived from rounding errors or from a stated false-alarm rate; none is tuned.
-All three raise ``AssertionError`` with the worst case in words, and return what they measured.
+Tolerances are derived from rounding errors or from a stated false-alarm rate.  All three raise
+``AssertionError`` with the worst case in words, and return what they measured.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from vslam_ref.metrics.consistency.bands import mean_band
 
 Array = NDArray[np.float64]
 Difference = Callable[[Array, Array], Array]
-Derivative = tuple[Array, Array, str]
-"""Numeric Jacobian, tolerance of each entry, method."""
+Derivative = tuple[Array, Array, str]  # numeric Jacobian, tolerance of each entry, method
 
 EPS = float(np.finfo(np.float64).eps)
 _STEP = EPS ** (1 / 7)

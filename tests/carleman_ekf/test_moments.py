@@ -14,7 +14,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from vslam_ref.filters.carleman_ekf import lift, moments, reduced
+from vslam_ref.filters.carleman_ekf import lift, moments, reduced_moments
 from vslam_ref.filters.carleman_ekf.lifted import LiftedCarlemanEkf
 from vslam_ref.filters.vehicle import Increment, ackermann_increment
 from vslam_ref.worlds import vehicle_field
@@ -67,7 +67,7 @@ def test_lifted_start_is_the_quadrature(b: int) -> None:
 
 @pytest.mark.parametrize("b", range(3))
 def test_reduced_start_is_the_quadrature(b: int) -> None:
-    x, P = reduced.start_moments(MEAN, COV, "gaussian")
+    x, P = reduced_moments.start_moments(MEAN, COV, "gaussian")
     first, second = quadrature(lambda v: lift.lift_vehicle(v)[:, :4], MEAN[b], COV[b])
     assert np.abs(x[b] - first).max() < 1e-13 * SCALE**2
     assert np.abs(P[b] - second).max() < 1e-13 * SCALE**2
@@ -84,7 +84,7 @@ def test_lifted_control_is_the_quadrature(b: int) -> None:
 @pytest.mark.parametrize("b", range(3))
 def test_reduced_control_is_the_quadrature(b: int) -> None:
     at = np.array([INCREMENT.ds[b], INCREMENT.dalpha[b]])
-    mean, C = reduced.control_gaussian(INCREMENT)
+    mean, C = reduced_moments.control_gaussian(INCREMENT)
     first, second = quadrature(reduced_monomials, at, INCREMENT.cov[b])
     assert np.abs(mean[b] - first).max() < 1e-13 * SCALE**2
     assert np.abs(C[b] - second).max() < 1e-13 * SCALE**2
@@ -110,7 +110,7 @@ def test_small_variances_keep_their_digits() -> None:
     cov = np.zeros((1, 3, 3))
     cov[0, 2, 2] = v
     _, P = moments.lifted_start(np.zeros((1, 3)), cov, "gaussian")
-    _, P_r = reduced.start_moments(np.zeros((1, 3)), cov, "gaussian")
+    _, P_r = reduced_moments.start_moments(np.zeros((1, 3)), cov, "gaussian")
     assert abs(P[0, 3, 3] / exact - 1) < 1e-8  # the terms themselves, of size v / 4, cancel: eps / v
     assert abs(P_r[0, 3, 3] / exact - 1) < 1e-8
     sin = float((1 - mpmath.exp(-2 * mpmath.mpf(v))) / 2)
@@ -132,12 +132,13 @@ def test_first_order_is_the_limit_of_small_covariances(what: str) -> None:
             if what == "lifted start":
                 out.append(moments.lifted_start(MEAN, t * COV, kind))
             elif what == "reduced start":
-                out.append(reduced.start_moments(MEAN, t * COV, kind))
+                out.append(reduced_moments.start_moments(MEAN, t * COV, kind))
             elif what == "reduced control":
                 out.append(
-                    {"first_order": reduced.control_first_order, "gaussian": reduced.control_gaussian}[kind](
-                        small
-                    )
+                    {
+                        "first_order": reduced_moments.control_first_order,
+                        "gaussian": reduced_moments.control_gaussian,
+                    }[kind](small)
                 )
             else:
                 w = moments.control_moments(small, kind)

@@ -62,6 +62,21 @@ def test_left_jacobian_is_its_series(phi: float) -> None:
     assert np.abs(se2.left_jacobian(xi) - exact_left_jacobian(xi)).max() < 16 * EPS * 2.1
 
 
+@pytest.mark.parametrize(
+    "phi", [1e-9, 0.02, 0.049, 0.051, 0.3, 0.45, np.nextafter(0.5, 0), 0.5, 0.55, 1.0, 2.5]
+)
+def test_left_jacobian_tail_keeps_its_digits(phi: float) -> None:
+    """With rho = (1, 0) the last column is (k1, -k2): a relative error, which a lost series term would show.
+
+    The series cost 4 eps; above 0.5 the difference phi - sin phi has lost 6 / phi^2 of them.
+    """
+    J = se2.left_jacobian([1.0, 0.0, phi])
+    p = mpmath.mpf(phi)
+    k1, k2 = (p - mpmath.sin(p)) / p**2, (1 - mpmath.cos(p)) / p**2
+    assert abs(J[0, 2] / k1 - 1) < (4 if phi < 0.5 else 4 + 6 / phi**2) * EPS
+    assert abs(-J[1, 2] / k2 - 1) < 4 * EPS
+
+
 @pytest.mark.parametrize("phi", PHIS)
 def test_left_jacobian_inverse(phi: float) -> None:
     """The condition of J_l stays below 30 for |rho| < 3 and |phi| < pi."""

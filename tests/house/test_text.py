@@ -15,7 +15,9 @@ BINARY = {".png", ".jpg", ".npz", ".gz", ".bz2", ".pdf", ".woff2"}
 
 # Written in pieces, so that this file does not contain what it looks for.
 FOLDERS = r"(?:home|Users|root|work|tmp|private|mnt)"
-MACHINE_PATH = re.compile(r"(?<![\w.~}/-])/" + FOLDERS + r"/\w" + r"|[A-Z]:\\" + r"\w")
+MACHINE_PATH = re.compile(
+    r"(?<![\w.~}/-])/" + FOLDERS + r"/\w" + r"|\b[A-Z]:\\{1,2}(?:Users|Windows|Program)\b"
+)
 LEFTOVER = re.compile(r"\b(?:TO" + r"DO|FIX" + r"ME|XX" + r"X)\b|^(?:<{7}|>{7}) ", re.MULTILINE)
 PICTURE = re.compile(r'"image/png": "[^"]*"')  # base64 inside a notebook
 NEIGHBOUR = "../" + "shared"
@@ -45,7 +47,7 @@ def offences(pattern: re.Pattern[str]) -> list[str]:
 
 def test_the_search_finds_what_it_looks_for() -> None:
     assert MACHINE_PATH.search("open('/" + "home/ann/data')")
-    assert MACHINE_PATH.search("see C:" + "\\data")
+    assert MACHINE_PATH.search("see C:" + "\\Users\\ann")
     assert not MACHINE_PATH.search("docs/_build/work/x and https://example.org/home/x")
     assert LEFTOVER.search("# TO" + "DO: later")
     assert len(project_files()) > 20

@@ -142,7 +142,7 @@ def _require_sane(table: Columns) -> None:
     ):
         at = np.flatnonzero(bad)
         if len(at):
-            what = f"{name} {table.values[at[0], column]:g}; expected {right}"
+            what = f"{name} is {table.values[at[0], column]:g}; expected {right}"
             raise FormatError(table.path, int(table.lines[at[0]]), what)
 
 

@@ -1,4 +1,7 @@
-"""Figure 2 of seed B: Mean NEES of EKF-SLAM, low and high initial uncertainty."""
+"""Figure 2 of seed B: Mean NEES of EKF-SLAM, low and high initial uncertainty.
+
+Implements B fig 2.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Figure 3 of seed B: Mean NEES of IEKF-SLAM (Carleman lift), low and high initial uncertainty."""
+"""Figure 3 of seed B: Mean NEES of IEKF-SLAM (Carleman lift), low and high initial uncertainty.
+
+Implements B fig 3.
+"""
 
 from __future__ import annotations
 

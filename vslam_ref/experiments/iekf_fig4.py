@@ -1,4 +1,7 @@
-"""Figure 4 of seed B: Mean position error of EKF-SLAM and IEKF-SLAM."""
+"""Figure 4 of seed B: Mean position error of EKF-SLAM and IEKF-SLAM.
+
+Implements B fig 4.
+"""
 
 from __future__ import annotations
 

@@ -50,6 +50,8 @@ class Truth(NamedTuple):
 class EkfSlam:
     """EKF-SLAM for a batch of runs.
 
+    Implements the state of :eq:`eq-b1`, :eq:`eq-b2` and :eq:`eq-b3` (B1-B3): pose, then landmarks.
+
     Parameters
     ----------
     mean : array_like, shape (3,) or (B, 3)
@@ -120,6 +122,7 @@ class EkfSlam:
         return seen
 
     def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
+        """Update with the measurement z = h + noise. Implements :eq:`eq-b20` (B20)."""
         b = self.blocks
         columns = b.columns(ids)
         if self._truth is None:

@@ -69,7 +69,7 @@ def vehicle_from_world_with_jacobians(pose: ArrayLike, landmark: ArrayLike) -> O
 def world_from_vehicle(pose: ArrayLike, measurement: ArrayLike) -> Array:
     """World coordinates of a landmark measured in the vehicle frame.
 
-    Implements :eq:`eq-b25` (B25), the composition of B23 and B24.
+    Implements :eq:`eq-b25` (B25), which is :eq:`eq-b23` (B23) composed as in :eq:`eq-b24` (B24).
 
     Parameters
     ----------

@@ -12,8 +12,8 @@ from vslam_ref.plot import style
 
 Array = NDArray[np.float64]
 
-COLOURS = (style.BLUE, style.VERMILION, style.ORANGE, style.BLACK, style.GREEN, style.PURPLE)
-LINES = ("-", "--", "-.", (0, (6, 2)), ":", (0, (3, 1, 1, 1, 1, 1)))
+COLOURS = (style.BLUE, style.VERMILION, style.ORANGE, style.YELLOW, style.BLACK, style.GREEN, style.PURPLE)
+LINES = ("-", "--", "-.", "-", (0, (6, 2)), ":", (0, (3, 1, 1, 1, 1, 1)))
 
 
 def variants_figure(
@@ -58,5 +58,5 @@ def variants_figure(
             textcoords="offset points", ha="right", color=style.GREY, fontsize=9,
         )  # fmt: skip
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False)
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     return figure

@@ -111,7 +111,7 @@ class Task(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """Per run: NEES (M, T + 1), position error in m and heading error in rad likewise, NIS per number (M, K)."""
+    """Per run: NEES, position error [m] and heading error [rad] (M, T + 1); NIS per number (M, K)."""
 
     nees: Array
     position_error: Array
@@ -211,17 +211,13 @@ def drive(slam: SlamFilter, world: VehicleField, noise: Noise, scale: float = 1.
 
 
 def tasks_of(config: StudyConfig) -> list[Task]:
-    """All batches of a study, in a fixed order.
-
-    The ideal EKF runs at low P0 only: at 0.03 rad^2 its Jacobians at the truth meet estimates that are
-    turned by ten degrees and more, and it diverges; as a control it would say nothing.
-    """
+    """All batches of a study, in a fixed order."""
     wanted = [(name, config.population) for name in config.filters]
     wanted += [("control", config.control_runs)] if config.control_runs else []
     return [
         Task(config, name, p0, first, min(config.batch, total - first))
         for name, total in wanted
-        for p0 in (("low",) if name == "ekf-ideal" else ("low", "high"))
+        for p0 in ("low", "high")
         for first in range(0, total, config.batch)
     ]
 

@@ -229,7 +229,7 @@ def solve_batch(
             if new <= cost or damping > 1e8:
                 break
             damping *= 10.0
-        converged = cost - new <= 1e-9 * cost
+        converged = cost - new <= 1e-7 * cost
         if new <= cost:
             (poses, landmarks, calibration), o, s, cost = trial, o_new, s_new, new
         damping = max(damping / 10.0, 1e-12)

@@ -69,7 +69,10 @@ class LiftedCarlemanEkf:
         return lift.VEHICLE + lift.LANDMARK * len(self._slots)
 
     def state(self) -> tuple[Array, Array]:
-        """Lifted mean (B, 11 + 6 n) and covariance (B, 11 + 6 n, 11 + 6 n), brought up to date; copies."""
+        """Lifted mean (B, 11 + 6 n) and covariance (B, 11 + 6 n, 11 + 6 n), brought up to date; copies.
+
+        Implements :eq:`eq-b12` and :eq:`eq-b13` (B12, B13), the six states of a landmark side by side.
+        """
         self._apply_accumulated()
         return self._z[:, : self.size].copy(), self._P[:, : self.size, : self.size].copy()
 
@@ -83,7 +86,10 @@ class LiftedCarlemanEkf:
         self._steps = 0
 
     def predict(self, increment: Increment) -> None:
-        """Move by an increment. Implements :eq:`eq-b16` (B16), :eq:`eq-b17` (B17), B18 and B19."""
+        """Move by an increment.
+
+        Implements :eq:`eq-b16`, :eq:`eq-b17`, :eq:`eq-b18` and :eq:`eq-b19` (B16-B19).
+        """
         w = moments.control_moments(increment, self.control, self.variant.product_of_means)
         M_R, M_L = lift.vehicle_matrix(w.mean), lift.landmark_matrix(w.mean, self.variant)
         noise = self._noise_factor(w.factor)
@@ -166,7 +172,7 @@ class LiftedCarlemanEkf:
         return Innovation(innovation, S)
 
     def _augment(self, identity: int, z: Array, cov_z: Array) -> None:
-        """Add a landmark. Implements :eq:`eq-b26` (B26), :eq:`eq-b27` (B27) and B28."""
+        """Add a landmark. Implements :eq:`eq-b26`, :eq:`eq-b27` and :eq:`eq-b28` (B26-B28)."""
         old = self.size
         if old + lift.LANDMARK > self._z.shape[1]:
             more = max(lift.LANDMARK, self._z.shape[1] - lift.VEHICLE)

@@ -19,6 +19,8 @@ arrives.  A prediction then costs O(1), a measurement O(k n^2).
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -76,6 +78,9 @@ def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array)
 @accelerated("reduced:reduced_predict")
 def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
     """One prediction, in place, without touching a landmark.
+
+    Implements :eq:`eq-b7`, :eq:`eq-b8`, :eq:`eq-b9`, :eq:`eq-b10` and :eq:`eq-b11` (B7-B11): ``step``
+    is A, and the first four rows of ``J`` are J, its columns for (u1, u3, -u2).
 
     Parameters
     ----------
@@ -159,6 +164,14 @@ class ReducedCarlemanEkf:
         self._P_a = np.zeros((len(x), 8, 8))
         self._P_a[:, :4, :4] = self.blocks.P_pp
         self.blocks.P_pp = self._P_a[:, :4, :4]
+
+    def __deepcopy__(self, memo: dict[int, object]) -> ReducedCarlemanEkf:
+        """Copy the arrays, and let the copy's pose covariance be a part of its own augmented one."""
+        twin = copy.copy(self)
+        twin.blocks = copy.deepcopy(self.blocks)
+        twin._frame, twin._P_a = self._frame.copy(), self._P_a.copy()
+        twin.blocks.P_pp = twin._P_a[:, :4, :4]
+        return twin
 
     def predict(self, increment: Increment) -> None:
         """Move by an increment, in O(1). The reduced :eq:`eq-b16` (B16) and B18."""

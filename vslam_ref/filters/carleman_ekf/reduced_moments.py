@@ -17,8 +17,9 @@ Complex = NDArray[np.complex128]
 def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
     """Mean (B, 4) and covariance (B, 4, 4) of (x, y, sin, cos) for a pose N(mean (B, 3), cov (B, 3, 3)).
 
-    ``first_order``: by the Jacobian.  ``gaussian``: with v the heading's variance and k the
-    covariance of position and heading, E[h] = e^{i theta - v/2}, cov(position, h) = i k E[h], E[h h] = e^{2i theta - 2v}.
+    Implements :eq:`eq-b5` (B5) and its covariance.  ``first_order``: by the Jacobian.  ``gaussian``: with v
+    the heading's variance and k the covariance of position and heading, E[h] = e^{i theta - v/2},
+    cov(position, h) = i k E[h], E[h h] = e^{2i theta - 2v}.
     """
     x, y, theta = mean.T
     s, c = np.sin(theta), np.cos(theta)

@@ -62,9 +62,14 @@ class Placed(NamedTuple):
 
     @property
     def nees(self) -> Array:
-        """Normalised estimation error squared of each, shape (N,); 3 degrees of freedom."""
-        e = self.errors[:, :, None]
-        return np.asarray(np.sum(e * np.linalg.solve(self.covs, e), (1, 2)))
+        """Normalised estimation error squared of each, shape (N,); 3 degrees of freedom.
+
+        NaN where the covariance is singular: at a start that is certain.
+        """
+        e, values = self.errors[:, :, None], np.full(len(self.times), np.nan)
+        ok = np.linalg.eigvalsh(self.covs)[:, 0] > 0
+        values[ok] = np.sum(e[ok] * np.linalg.solve(self.covs[ok], e[ok]), (1, 2))
+        return values
 
 
 def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -133,6 +138,7 @@ def summary(run: LogRun, truth: Truth | None) -> dict[str, float | int | None]:
         result["landmark_rmse_m"] = root_mean_square(map_errors) if len(map_errors) else None
     if unaligned is not None:
         result["rmse_position_unaligned_m"] = root_mean_square(unaligned.errors[:, :2])
-        if truth.exact:
-            result["nees_mean"] = float(np.mean(unaligned.nees))
+        nees = unaligned.nees
+        if truth.exact and np.isfinite(nees).any():
+            result["nees_mean"] = float(np.nanmean(nees))
     return result
