@@ -153,20 +153,18 @@ def landmark_update(
         S.
     """
     B, m, _, p = H_p.shape
-    M = P_mm.shape[2]
-    pairs = (columns[:, None] + np.arange(2)).ravel()  # (2m,)
-    rows = P_mm[:, pairs].reshape(B, m, 2, M)
-    HP_m = (H_l @ rows + H_p @ P_pm[:, None]).reshape(B, 2 * m, M)
-    rows_p = P_pm[:, :, pairs].swapaxes(1, 2).reshape(B, m, 2, p)
-    HP_p = (H_l @ rows_p + H_p @ P_pp[:, None]).reshape(B, 2 * m, p)
-    HPl = HP_m[:, :, pairs].reshape(B, 2 * m, m, 2)
-    S = HP_p @ H_p.reshape(B, 2 * m, p).swapaxes(1, 2)
-    S += np.einsum("bkmj,bmij->bkmi", HPl, H_l).reshape(B, 2 * m, 2 * m)
-    for j in range(m):
-        S[:, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += cov_z[j]
-    whiten = np.linalg.inv(np.linalg.cholesky(S))
-    W_p, W_m = whiten @ HP_p, whiten @ HP_m
-    y = whiten @ innovation[:, :, None]
+    k, M = 2 * m, P_mm.shape[2]
+    pairs = (columns[:, None] + np.arange(2)).ravel()  # (k,)
+    HP_p = H_l @ P_pm[:, :, pairs].swapaxes(1, 2).reshape(B, m, 2, p) + H_p @ P_pp[:, None]
+    HP_m = H_l @ P_mm[:, pairs].reshape(B, m, 2, M) + H_p @ P_pm[:, None]
+    # H P and the innovation in one array, so that one product whitens all three
+    HP = np.concatenate([HP_p.reshape(B, k, p), HP_m.reshape(B, k, M), innovation[:, :, None]], 2)
+    HPH = HP[:, :, p + pairs].reshape(B, k, m, 2)
+    S = HP[:, :, :p] @ H_p.reshape(B, k, p).swapaxes(1, 2)
+    S += np.einsum("bkmj,bmij->bkmi", HPH, H_l).reshape(B, k, k)
+    np.einsum("bminj->bmnij", S.reshape(B, m, 2, m, 2))[:, range(m), range(m)] += cov_z
+    W = np.linalg.inv(np.linalg.cholesky(S)) @ HP
+    W_p, W_m, y = W[:, :, :p], W[:, :, p:-1], W[:, :, -1:]
     x_p += (W_p.swapaxes(1, 2) @ y)[:, :, 0]
     x_m += (W_m.swapaxes(1, 2) @ y)[:, :, 0]
     P_pp -= W_p.swapaxes(1, 2) @ W_p

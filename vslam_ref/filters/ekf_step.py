@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.filters import observation, vehicle
+from vslam_ref.filters import observation
 from vslam_ref.filters.block_covariance import landmark_update
 from vslam_ref.geometry import so2
 
@@ -45,14 +45,17 @@ def ekf_predict(
     ds, dalpha, cov : ndarray, shapes (B,), (B,), (B, 2, 2)
         The increment.
     """
-    pose, increment = np.zeros((len(at), 3)), np.zeros((len(at), 2))
-    pose[:, 2], increment[:, 0] = at.T
-    _, J_pose, J_inc = vehicle.propagate_with_jacobians(pose, increment)
+    c, s, d = np.cos(at[:, 0]), np.sin(at[:, 0]), at[:, 1]
+    gain, G = np.empty((len(at), 2, 1)), np.zeros((len(at), 3, 2))
+    gain[:, 0, 0], gain[:, 1, 0] = -d * s, d * c
+    G[:, 0, 0], G[:, 1, 0], G[:, 2, 1] = c, s, 1.0
     x_p[:, 0] += ds * np.cos(x_p[:, 2])
     x_p[:, 1] += ds * np.sin(x_p[:, 2])
     x_p[:, 2] = so2.wrap(x_p[:, 2] + dalpha)
-    P_pp[:] = J_pose @ P_pp @ J_pose.swapaxes(1, 2) + J_inc @ cov @ J_inc.swapaxes(1, 2)
-    P_pm[:, :2] += J_pose[:, :2, 2:] * P_pm[:, 2:]
+    P_pp[:, :2] += gain * P_pp[:, 2:]
+    P_pp[:, :, :2] += P_pp[:, :, 2:] * gain.swapaxes(1, 2)
+    P_pp += G @ cov @ G.swapaxes(1, 2)
+    P_pm[:, :2] += gain * P_pm[:, 2:]
 
 
 @accelerated("slam:ekf_update")
@@ -88,7 +91,7 @@ def ekf_update(
     S : ndarray, shape (B, 2 m, 2 m)
         Its covariance.
     """
-    landmarks = np.stack([x_m[:, columns], x_m[:, columns + 1]], -1)
+    landmarks = x_m[:, columns[:, None] + np.arange(2)]
     H = observation.vehicle_from_world_with_jacobians(x_p[:, None], landmarks)
     innovation = (z - H.value).reshape(len(z), -1)
     S = landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z)
@@ -111,5 +114,7 @@ def ekf_step(
     cov_z: Array,
 ) -> tuple[Array, Array]:
     """:func:`ekf_predict` by the increment ds, dalpha (B,), cov (B, 2, 2), then :func:`ekf_update`."""
-    ekf_predict(x_p, P_pp, P_pm, np.stack([x_p[:, 2], ds], 1), ds, dalpha, cov)
+    at = np.empty((len(x_p), 2))
+    at[:, 0], at[:, 1] = x_p[:, 2], ds
+    ekf_predict(x_p, P_pp, P_pm, at, ds, dalpha, cov)
     return ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z)

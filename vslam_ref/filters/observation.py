@@ -57,12 +57,16 @@ def vehicle_from_world_with_jacobians(pose: ArrayLike, landmark: ArrayLike) -> O
     """:func:`vehicle_from_world` and its Jacobians; same parameters."""
     pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
     d = landmark - pose[..., :2]
-    theta = np.broadcast_to(pose[..., 2], d.shape[:-1])
-    c, s = np.cos(theta), np.sin(theta)
-    value = np.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0]], -1)
-    J_landmark = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
-    J_theta = np.stack([value[..., 1], -value[..., 0]], -1)
-    J_pose = np.concatenate([-J_landmark, J_theta[..., None]], -1)
+    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    value, J_pose, J_landmark = np.empty(d.shape), np.empty((*d.shape, 3)), np.empty((*d.shape, 2))
+    value[..., 0] = c * d[..., 0] + s * d[..., 1]
+    value[..., 1] = c * d[..., 1] - s * d[..., 0]
+    J_landmark[..., 0, 0] = J_landmark[..., 1, 1] = c
+    J_landmark[..., 0, 1] = s
+    J_landmark[..., 1, 0] = -s
+    J_pose[..., :2] = -J_landmark
+    J_pose[..., 0, 2] = value[..., 1]
+    J_pose[..., 1, 2] = -value[..., 0]
     return ObservationJacobians(value, J_pose, J_landmark)
 
 

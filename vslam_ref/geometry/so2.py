@@ -31,10 +31,13 @@ def wrap(angle: ArrayLike) -> Array:
     True
     """
     a = np.asarray(angle, dtype=np.float64)
+    inside = (a > -np.pi) & (a <= np.pi)
+    if inside.all():
+        return a.copy()
     turned = np.pi - np.mod(np.pi - a, 2.0 * np.pi)
-    # fmod of a value in a hair below 0 rounds to 2 pi; -pi itself is the excluded end
+    # mod of a number a hair below 0 rounds to 2 pi, which would give -pi, the excluded end
     turned = np.where(turned <= -np.pi, np.pi, turned)
-    return np.where((a > -np.pi) & (a <= np.pi), a, turned)
+    return np.where(inside, a, turned)
 
 
 def exp(phi: ArrayLike) -> Array:

@@ -54,7 +54,9 @@ START = {
         sigma_range=0.1,
         sigma_bearing=0.015,
     ),
-    "victoria_park": Calibration(sensor_ahead=3.78, sigma_range=0.3),
+    "victoria_park": Calibration(
+        sigma_distance=0.1, sigma_turn=0.1, sigma_drift=0.02, sigma_range=0.3, sigma_bearing=0.02
+    ),
 }
 OUTLIERS = 0.01
 GATES = (60.0, 25.0, 13.816)
