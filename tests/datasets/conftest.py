@@ -10,7 +10,9 @@ import pytest
 MRCLAM = {
     "Barcodes.dat": "# subject barcode\n1 5\n2 14\n6 63\n7 81\n8 7\n",
     "Robot1_Odometry.dat": "# t v w\n100.0 0.1 0.0\n100.5 0.1 0.2\n101.0 0.1 0.2\n101.5 0.0 0.0\n",
-    "Robot1_Measurement.dat": "# t code r b\n100.2 63 2.0 0.1\n100.2 5 1.0 0.0\n100.9 63 1.9 0.1\n100.9 81 3.0 -0.2\n",
+    "Robot1_Measurement.dat": (
+        "# t code r b\n100.2 63 2.0 0.1\n100.2 5 1.0 0.0\n100.9 63 1.9 0.1\n100.9 81 3.0 -0.2\n"
+    ),
     "Robot1_Groundtruth.dat": "# t x y th\n99.0 1 2 3.1\n99.1 1 2 3.2\n101.6 1.1 2 3.3\n",
     "Landmark_Groundtruth.dat": "# s x y sx sy\n6 1 2 0 0\n7 3 4 0 0\n8 0 0 0 0\n",
 }

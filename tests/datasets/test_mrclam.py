@@ -47,11 +47,23 @@ def test_gzipped_files_read_the_same(mrclam_folder: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new", "where", "words"),
     [
-        ("Robot1_Odometry.dat", "0.1 0.2\n101.0", "0.1\n101.0", ":3", "2 columns; expected 3: time, v, omega"),
+        (
+            "Robot1_Odometry.dat",
+            "0.1 0.2\n101.0",
+            "0.1\n101.0",
+            ":3",
+            "2 columns; expected 3: time, v, omega",
+        ),
         ("Robot1_Odometry.dat", "101.0 0.1", "101.0 nan", ":4", "v is 'nan'; expected a finite number"),
         ("Robot1_Odometry.dat", "101.0", "100.4", ":4", "times must not go back"),
         ("Robot1_Measurement.dat", "100.9 63", "100.1 63", ":4", "times must not go back"),
-        ("Robot1_Measurement.dat", "100.9 81", "100.9 99", ":5", "unknown landmark: barcode 99 is in no line"),
+        (
+            "Robot1_Measurement.dat",
+            "100.9 81",
+            "100.9 99",
+            ":5",
+            "unknown landmark: barcode 99 is in no line",
+        ),
         ("Robot1_Measurement.dat", "63 2.0", "63 -2.0", ":2", "range is -2; expected more than 0 m"),
         ("Robot1_Measurement.dat", "3.0 -0.2", "3.0 -20", ":5", "bearing is -20; expected radians"),
         ("Robot1_Measurement.dat", "100.2 5", "100.2 5.5", ":3", "barcode is 5.5; expected an integer"),
@@ -118,8 +130,9 @@ def test_a_landmark_twice_at_one_time_makes_two_sightings() -> None:
 
 @pytest.mark.skipif(catalogue.find("utias_mrclam") is None, reason="utias_mrclam is not in VSLAM_REF_DATA")
 @pytest.mark.parametrize(
-    ("robot", "controls", "landmark_sightings", "other", "misread"), [(1, 61785, 1534, 407, 1), (3, 61158, 4348, 1277, 2)]
-)  # fmt: skip
+    ("robot", "controls", "landmark_sightings", "other", "misread"),
+    [(1, 61785, 1534, 407, 1), (3, 61158, 4348, 1277, 2)],
+)
 def test_the_real_set_has_the_counts_its_description_states(
     robot: int, controls: int, landmark_sightings: int, other: int, misread: int
 ) -> None:

@@ -24,7 +24,9 @@ def test_the_encoder_wheel_is_inside_of_a_left_turn() -> None:
     speed = park.rear_axle_speed(np.ones(3), steering)
     radius = park.WHEELBASE / np.tan(0.3)
     np.testing.assert_allclose(
-        speed, [radius / (radius - park.ENCODER_OFFSET), 1.0, radius / (radius + park.ENCODER_OFFSET)], rtol=1e-14
+        speed,
+        [radius / (radius - park.ENCODER_OFFSET), 1.0, radius / (radius + park.ENCODER_OFFSET)],
+        rtol=1e-14,
     )
 
 

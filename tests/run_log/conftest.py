@@ -37,7 +37,9 @@ def drive(seconds: float, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return times, controls, poses
 
 
-def write_world(folder: Path, noise: Calibration | None, rng: np.random.Generator, seconds: float = 60.0) -> World:
+def write_world(
+    folder: Path, noise: Calibration | None, rng: np.random.Generator, seconds: float = 60.0
+) -> World:
     """Write one robot's log; with ``noise`` exactly the noises that calibration describes."""
     folder.mkdir(parents=True, exist_ok=True)
     dt = 0.05
@@ -59,10 +61,15 @@ def write_world(folder: Path, noise: Calibration | None, rng: np.random.Generato
         z = observation.vehicle_from_world(poses[k], LANDMARKS)
         r, b = np.hypot(*z.T), np.arctan2(z[:, 1], z[:, 0])
         for j in np.flatnonzero((np.abs(b) < 1.0) & (r < 6.0)):
-            e = rng.standard_normal(2) * [noise.sigma_range, noise.sigma_bearing] if noise is not None else (0, 0)
+            e = (
+                rng.standard_normal(2) * [noise.sigma_range, noise.sigma_bearing]
+                if noise is not None
+                else (0, 0)
+            )
             rows.append(f"{1000 + times[k]:.6f} {60 + j} {r[j] + e[0]:.12f} {b[j] + e[1]:.12f}")
     lines = {
-        "Barcodes.dat": [f"{s} {s}" for s in range(1, 6)] + [f"{6 + j} {60 + j}" for j in range(len(LANDMARKS))],
+        "Barcodes.dat": [f"{s} {s}" for s in range(1, 6)]
+        + [f"{6 + j} {60 + j}" for j in range(len(LANDMARKS))],
         "Robot1_Odometry.dat": [
             f"{1000 + t:.6f} {v:.12f} {w:.12f}" for t, (v, w) in zip(times, logged, strict=True)
         ],

@@ -118,7 +118,11 @@ def test_bad_words_are_told_in_one_line(
     folder: Path, tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "empty").mkdir()
-    places = {"FOLDER": str(folder), "TMP": str(tmp_path / "empty"), "MISSING": str(tmp_path / "no" / "x.json")}
+    places = {
+        "FOLDER": str(folder),
+        "TMP": str(tmp_path / "empty"),
+        "MISSING": str(tmp_path / "no" / "x.json"),
+    }
     assert run(*(places.get(word, word) for word in words)) == 2
     error = capsys.readouterr().err
     assert re.search(message, error)

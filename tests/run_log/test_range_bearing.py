@@ -13,7 +13,9 @@ NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(40)
 WEIGHTS = WEIGHTS / WEIGHTS.sum()
 
 
-def over_measurements(rho: float, beta: float, sigma_r: float, sigma_b: float) -> tuple[np.ndarray, np.ndarray]:
+def over_measurements(
+    rho: float, beta: float, sigma_r: float, sigma_b: float
+) -> tuple[np.ndarray, np.ndarray]:
     """All quadrature measurements (N, 2) of one landmark and their weights (N,)."""
     r, b = np.meshgrid(rho + sigma_r * NODES, beta + sigma_b * NODES, indexing="ij")
     return np.stack([r.ravel(), b.ravel()], -1), np.outer(WEIGHTS, WEIGHTS).ravel()
@@ -29,7 +31,10 @@ def test_mean_and_stated_covariance_are_the_true_ones(
     """Gauss-Hermite quadrature with 40 nodes is exact to rounding for these entire functions."""
     polar, w = over_measurements(rho, beta, sigma_r, sigma_b)
     near = np.all(np.abs((polar - [rho, beta]) / [sigma_r, sigma_b]) < 6, axis=1)
-    polar, w = polar[near], w[near]  # beyond 6 sigma weights are under 1e-9: no matter, and ranges may be negative
+    polar, w = (
+        polar[near],
+        w[near],
+    )  # beyond 6 sigma weights are under 1e-9: no matter, and ranges may be negative
     z, cov = range_bearing.cartesian_from_polar(polar, sigma_r, sigma_b)
     mean = w @ z
     np.testing.assert_allclose(mean, [rho * np.cos(beta), rho * np.sin(beta)], atol=1e-7 * rho)

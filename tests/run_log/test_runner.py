@@ -168,7 +168,9 @@ def test_longer_steps_change_the_trajectory_by_little(
     assert np.abs(fine.poses - coarse.poses).max() < 0.02
 
 
-def test_a_sighting_is_used_when_it_was_taken(make_world: Callable[..., object], calibration: Calibration) -> None:
+def test_a_sighting_is_used_when_it_was_taken(
+    make_world: Callable[..., object], calibration: Calibration
+) -> None:
     """A log whose sightings are stamped 0.3 s late is made good by the delay, and only by it."""
     world = make_world("w", None)
     log = mrclam.read_log(world.folder, 1)

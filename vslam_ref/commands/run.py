@@ -13,7 +13,7 @@ systems:
   ekf-slam    EKF-SLAM; the IEKF, the anchored EKF and a batch solution are shown beside it
   iekf-slam   IEKF-SLAM: the improved EKF of seed B (neither invariant nor iterated); same company
 
-data sets: mrclam (--robot N), victoria_park, found through VSLAM_REF_DATA; or a folder of one of these formats.
+data sets: mrclam (--robot N) and victoria_park, found through VSLAM_REF_DATA, or a folder in their format.
 Gains and noises are those identified without truth; '--set calibration.sigma_range=0.05' changes one,
 '--set run.gate=9' a setting of the run.
 
@@ -59,9 +59,8 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.experiments.slam_log import report
 
     heads, rows = report.number_rows(content)
-    print(
-        f"{source.log.name}: {content['sightings']} sightings of landmarks, truth: {content['truth'] or 'none'}"
-    )
+    seen, truth = content["sightings"], content["truth"] or "none"
+    print(f"{source.log.name}: {seen} sightings of landmarks, truth: {truth}")
     print(table(heads, rows))
     if out is not None:
         report.write_report(out, comparison, content)

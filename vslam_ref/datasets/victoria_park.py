@@ -154,7 +154,8 @@ def read_graph(path: Path) -> GraphFile:
 def _values(path: Path, line: int, words: list[str], names: tuple[str, ...], extra: int) -> list[float]:
     """The named numbers of a line; the first two are whole; ``extra`` more numbers follow."""
     if len(words) != len(names) + extra:
-        what = f"{len(words)} numbers; expected {len(names) + extra}: {', '.join(names)} and {extra} of the noise"
+        right = f"{', '.join(names)} and {extra} of the noise"
+        what = f"{len(words)} numbers; expected {len(names) + extra}: {right}"
         raise FormatError(path, line, what)
     values = [number(path, line, word, name) for word, name in zip(words, names, strict=False)]
     for value, name in zip(values[:2], names, strict=False):

@@ -124,9 +124,24 @@ def conclude(e: Evaluation) -> Claim:
     undecidable = e.null_rate > 1.0 - TELLING
     if undecidable:
         measured["reason"] = "the rule says yes too often where the claim is false"
+    elif not all(conditions.values()):
+        measured["reason"] = _why_not(e, conditions)
     outcome = verdict(None if undecidable else all(conditions.values()))
     ci = [float(end) for end in e.interval]
     return Claim(s.id, s.source, s.text, rule.text(), measured, ci, e.null_rate, e.share, outcome)
+
+
+def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:
+    """Say why a claim is not reproduced: not true of the filters, not seen by a study, or not telling."""
+    low, high = e.interval
+    side = ">" if e.sentence.rule.above else "<="
+    yes, null = f"{e.share:.0%}", f"{e.null_rate:.0%}"
+    reasons = {
+        "true": f"over all runs the statistic is in [{low:.3g}, {high:.3g}], not clearly {side} {e.threshold:.3g}",
+        "seen": f"only {yes} of studies of B's size show it, so one figure may or may not",
+        "telling": f"the rule says yes in {null} where the claim is false, too near to {yes}",
+    }
+    return "; ".join(text for name, text in reasons.items() if not conditions[name])
 
 
 def all_at_once(evaluations: Sequence[Evaluation]) -> dict[str, float]:

@@ -123,7 +123,7 @@ def compare(
         from vslam_ref.experiments.slam_log.batch import solve_batch
 
         start = runs["ekf"] if "ekf" in runs else run_log(source.log, config.calibration, "ekf", config.run)
-        bound = as_run(solve_batch(source.log, config.calibration, start, gate=config.run.gate), start)
+        bound = as_run(solve_batch(source.log, config.calibration, start), start)
     return Comparison(source, config, runs, bound)
 
 
