@@ -142,7 +142,7 @@ def test_the_likeliest_noises_are_those_of_the_world(
     """Sensor noises of a log within 4 standard errors: about 1 / sqrt(2 x 400 sightings) = 3.5 % each."""
     log, _ = read(make_world, calibration, 12)
     start = replace(calibration, sigma_range=0.1, sigma_bearing=0.01, sigma_turn=0.04)
-    found, likelihood = identify.fit_noises([log], start, replace(identify.SETTINGS, gate=50.0))
+    found, likelihood = identify.most_likely([log], start, {})
     assert found.sigma_range == pytest.approx(0.05, rel=0.14)
     assert found.sigma_bearing == pytest.approx(0.02, rel=0.14)
     assert likelihood > identify.log_likelihood(run_log(log, start, "ekf"), identify.field_area(log))

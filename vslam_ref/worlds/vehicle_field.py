@@ -17,7 +17,7 @@ noise.  The true path and the landmarks are the same for all runs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,18 @@ class VehicleField(NamedTuple):
     sightings: tuple[Sighting, ...]
 
 
+class Course(Protocol):
+    """What noises are drawn for: controls (T, 2) and sightings; every world with a known path has them."""
+
+    @property
+    def controls(self) -> Array:
+        """True controls (T, 2)."""
+
+    @property
+    def sightings(self) -> tuple[Sighting, ...]:
+        """What is seen when."""
+
+
 class Noise(NamedTuple):
     """Standard normal draws of B runs: start (B, 3), controls (B, T, 2), one (B, m, 2) array per sighting."""
 
@@ -162,7 +174,7 @@ def make_field(config: VehicleFieldConfig, rng: np.random.Generator) -> VehicleF
     return VehicleField(config, times, poses, controls, landmarks, tuple(sightings))
 
 
-def draw_noise(world: VehicleField, generators: list[np.random.Generator]) -> Noise:
+def draw_noise(world: Course, generators: list[np.random.Generator]) -> Noise:
     """Draw the noises of B runs, each from its own generator: the same bytes in any batch."""
     start = np.stack([g.standard_normal(3) for g in generators])
     controls = np.stack([g.standard_normal(world.controls.shape) for g in generators])

@@ -137,7 +137,7 @@ def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:
     side = ">" if e.sentence.rule.above else "<="
     yes, null = f"{e.share:.0%}", f"{e.null_rate:.0%}"
     reasons = {
-        "true": f"over all runs the statistic is in [{low:.3g}, {high:.3g}], not clearly {side} {e.threshold:.3g}",
+        "true": f"over all runs it is in [{low:.3g}, {high:.3g}], not clearly {side} {e.threshold:.3g}",
         "seen": f"only {yes} of studies of B's size show it, so one figure may or may not",
         "telling": f"the rule says yes in {null} where the claim is false, too near to {yes}",
     }

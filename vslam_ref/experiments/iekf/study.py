@@ -78,6 +78,9 @@ class StudyConfig:
         default=50, metadata={"reason": "runs computed together; part of the numbers' bytes"}
     )
     seed: int = dataclasses.field(default=2016, metadata={"reason": "B's year; chosen before it was run"})
+    layout: int | None = dataclasses.field(
+        default=None, metadata={"reason": "landmarks from the study's seed; a number: from that seed instead"}
+    )
 
     def __post_init__(self) -> None:
         """Refuse studies that mean nothing."""
@@ -141,8 +144,9 @@ class Mapper(Protocol):
 
 @lru_cache(maxsize=4)
 def study_field(config: StudyConfig) -> VehicleField:
-    """The world of a study; its landmarks come from the first child of the seed."""
-    return make_field(config.field, np.random.default_rng(np.random.SeedSequence(config.seed).spawn(3)[0]))
+    """The world of a study; its landmarks come from the first child of the seed, or of ``layout``."""
+    root = np.random.SeedSequence(config.seed if config.layout is None else config.layout)
+    return make_field(config.field, np.random.default_rng(root.spawn(3)[0]))
 
 
 def run_noise(config: StudyConfig, control: bool, first: int, count: int) -> Noise:

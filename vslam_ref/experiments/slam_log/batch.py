@@ -45,6 +45,8 @@ STEPS = {
     "range_cosine": 1e-3,
 }
 """Calibration values that can be unknowns, and the step of their numeric derivatives."""
+TOLERANCE = 1e-7
+"""Relative decrease of the cost at which the search ends."""
 STUDENT = 4.0
 """Degrees of freedom nu of the sightings' loss."""
 PLAUSIBLE = 13.816
@@ -218,38 +220,37 @@ def solve_batch(
     max_iterations : int
     """
     problem = _Problem(log, free)
-    times = sighting_times(log, calibration)
-    poses = np.stack(
-        [
-            np.interp(times, start.times, np.unwrap(start.poses[:, i]) if i == 2 else start.poses[:, i])
-            for i in range(3)
-        ],
-        -1,
-    )
     place = dict(zip(start.map.ids.tolist(), start.map.mean[0], strict=True))
     landmarks = np.array([place[int(i)] for i in problem.ids])
-    o, s = problem.residuals(poses, landmarks, calibration)
-    cost, damping, converged, iteration = problem.cost(o, s), 1e-4, False, 0
-    for iteration in range(1, max_iterations + 1):
+    whole = np.column_stack([start.poses[:, :2], np.unwrap(start.poses[:, 2])])
+    times = sighting_times(log, calibration)
+    poses = np.stack([np.interp(times, start.times, column) for column in whole.T], -1)
+    return _minimise(problem, (poses, landmarks, calibration), max_iterations)
+
+
+def _minimise(problem: _Problem, at: tuple[Array, Array, Calibration], max_iterations: int) -> Batch:
+    """Levenberg-Marquardt with the diagonal of the normal matrix as damping."""
+    o, s = problem.residuals(*at)
+    cost, damping, converged, iterations = problem.cost(o, s), 1e-4, False, 0
+    while iterations < max_iterations and not converged:
+        iterations += 1
         root = _root_weights(s)
-        J = problem.jacobian(poses, landmarks, calibration, root)
+        J = problem.jacobian(*at, root)
         r = np.concatenate([o.ravel(), (s * root[:, None]).ravel()])
         N, g = (J.T @ J).tocsc(), J.T @ r
-        while True:
+        new = np.inf
+        while new > cost and damping < 1e8:
             step = splu(N + sparse.diags(damping * N.diagonal() + 1e-12, format="csc")).solve(-g)
-            trial = _moved(poses, landmarks, calibration, step, free)
+            trial = _moved(*at, step, problem.free)
             o_new, s_new = problem.residuals(*trial)
             new = problem.cost(o_new, s_new)
-            if new <= cost or damping > 1e8:
-                break
             damping *= 10.0
-        converged = cost - new <= 1e-7 * cost
-        if new <= cost:
-            (poses, landmarks, calibration), o, s, cost = trial, o_new, s_new, new
-        damping = max(damping / 10.0, 1e-12)
-        if converged:
-            break
-    return _result(problem, times, poses, landmarks, calibration, cost, iteration, converged)
+        if new > cost:
+            break  # no step helps: converged stays False
+        converged = cost - new <= TOLERANCE * cost
+        at, o, s, cost = trial, o_new, s_new, new
+        damping = max(damping / 100.0, 1e-12)
+    return _result(problem, at, cost, iterations, converged)
 
 
 def _moved(
@@ -264,10 +265,10 @@ def _moved(
 
 
 def _result(
-    problem: _Problem, times: Array, poses: Array, landmarks: Array, calibration: Calibration,
-    cost: float, iterations: int, converged: bool,
-) -> Batch:  # fmt: skip
-    o, s = problem.residuals(poses, landmarks, calibration)
+    problem: _Problem, at: tuple[Array, Array, Calibration], cost: float, iterations: int, converged: bool
+) -> Batch:
+    poses, landmarks, calibration = at
+    _, s = problem.residuals(*at)
     relative, _ = problem.odometry(calibration)
     e = se2.between(poses[:-1], poses[1:]) - relative.mean
     e[:, 2] = so2.wrap(e[:, 2])
@@ -281,6 +282,17 @@ def _result(
     free_cov = splu(N).solve(unit)[J.shape[1] - f :] if f else np.zeros((0, 0))
     poses = np.column_stack([poses[:, :2], so2.wrap(poses[:, 2])])
     return Batch(
-        times, poses, problem.ids, landmarks, calibration, cost, e, s * scale, used,
-        iterations, converged, problem.free, free_cov,
-    )  # fmt: skip
+        times=sighting_times(problem.log, calibration),
+        poses=poses,
+        ids=problem.ids,
+        landmarks=landmarks,
+        calibration=calibration,
+        cost=cost,
+        odometry=e,
+        sightings=s * scale,
+        used=used,
+        iterations=iterations,
+        converged=converged,
+        free=problem.free,
+        free_cov=free_cov,
+    )

@@ -2,15 +2,16 @@
 
     python -m vslam_ref.experiments.slam_log.identify mrclam          # prints; --write FILE writes
 
-Two steps are repeated ``ROUNDS`` times, on all logs of the set together:
+Two steps, on all logs of the set together:
 
-1. *gains and offsets*: a batch solution of each log with these values unknown.  A robot that sees one
-   landmark twice, with a turn and a way in between, has measured its own odometry.  The logs'
+1. *gains and offsets* from a batch solution of each log with these values unknown.  A robot that sees
+   one landmark twice, with a turn and a way in between, has measured its own odometry.  The logs'
    estimates are averaged with their information matrices, so all robots get the same values;
-2. *noises*: the five sigmas that make the innovations of the EKF most likely.  An innovation's
-   covariance contains odometry noise, sensor noise and map; one that is too small or too large costs
+2. *everything, noises above all*, where the innovations of the EKF are most likely.  An innovation's
+   covariance holds odometry noise, sensor noise and map; one that is too small or too large costs
    likelihood.  One sighting in a hundred is allowed to be anything inside the sensor's field, or a
-   few misread barcodes would inflate every sigma.
+   few misread barcodes would inflate every sigma.  One value at a time is moved to the summit of a
+   parabola, gains in units of their standard errors from step 1, sigmas in their logarithms.
 
 What the values rest on is written beside them: both logs' own gains with standard errors, the
 likelihoods, and residuals of repeated sightings (the same landmark within half a second, from almost
@@ -20,7 +21,6 @@ the same place).
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -61,9 +61,8 @@ START = {
 OUTLIERS = 0.01
 GATES = (13.816, 30.0, 60.0, 200.0, 1e9)
 """Tried at the end, to show what the gate of a run rests on."""
-ROUNDS = 3
-STRIDES = (0.5, 0.3, 0.15)
-"""Of the logarithms of the sigmas, one sweep each."""
+STRIDES = (2.0, 1.0, 0.5)
+"""Units between the three points of a parabola, one sweep each."""
 SETTINGS = RunSettings(max_step=0.1, start_sigma_position=0.0, start_sigma_heading=0.0)
 """Faster than odometry rate; the start is the frame, so it is certain."""
 
@@ -90,44 +89,62 @@ def pooled_gains(batches: Sequence[Batch]) -> tuple[Array, Array]:
 
 
 def fit_gains(
-    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str], settings: RunSettings
+    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str]
 ) -> tuple[Calibration, list[Batch]]:
     """Step 1: one batch solution per log, free values averaged."""
     batches = []
     for log in logs:
-        start = run_log(log, calibration, "ekf", settings)
+        start = run_log(log, calibration, "ekf", SETTINGS)
         batches.append(solve_batch(log, calibration, start, free))
     values, _ = pooled_gains(batches)
     return replace(calibration, **dict(zip(free, values.tolist(), strict=True))), batches
 
 
-def fit_noises(
-    logs: Sequence[SlamLog], calibration: Calibration, settings: RunSettings
+def most_likely(
+    logs: Sequence[SlamLog], calibration: Calibration, units: dict[str, float]
 ) -> tuple[Calibration, float]:
-    """Step 2: the most likely sigmas, by parabolas through three values of each logarithm in turn.
+    """Step 2: move the values of ``units`` and the sigmas, one at a time, until the logs are most likely.
 
-    The gate makes small steps in the likelihood; a parabola through points ``STRIDES`` apart looks past
-    them, where a gradient would not.
+    The gate makes small steps in the likelihood; a parabola through points ``STRIDES`` units apart looks
+    past them, where a gradient would not.  The likelihood never falls.
+
+    Parameters
+    ----------
+    logs : sequence of SlamLog
+    calibration : Calibration
+        Where the search begins.
+    units : dict
+        Gains and offsets to move -> size of one unit.
+
+    Returns
+    -------
+    Calibration, float
+        The most likely values found, and their log likelihood.
     """
     areas = [field_area(log) for log in logs]
 
-    def likelihood(x: Array) -> float:
-        trial = replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True)))
-        runs = (run_log(log, trial, "ekf", settings) for log in logs)
+    def likelihood(trial: Calibration) -> float:
+        runs = (run_log(log, trial, "ekf", SETTINGS) for log in logs)
         return sum(log_likelihood(run, area) for run, area in zip(runs, areas, strict=True))
 
-    x = np.log([getattr(calibration, name) for name in NOISES])
-    best = likelihood(x)
+    best = likelihood(calibration)
     for stride in STRIDES:
-        for i in range(len(x)):
-            unit = np.eye(len(x))[i]
-            low, high = likelihood(x - stride * unit), likelihood(x + stride * unit)
-            move = _summit(low, best, high) * stride
-            value = likelihood(x + move * unit)
-            candidates = {best: 0.0, low: -stride, high: stride, value: move}
-            best = max(candidates)
-            x = x + candidates[best] * unit
-    return replace(calibration, **dict(zip(NOISES, np.exp(x).tolist(), strict=True))), best
+        for name in (*NOISES, *units):
+            steps = (-stride, stride)
+            trials = {step: likelihood(moved(calibration, name, step, units)) for step in steps}
+            summit = stride * _summit(trials[-stride], best, trials[stride])
+            trials[summit] = likelihood(moved(calibration, name, summit, units))
+            step = max(trials, key=lambda k: trials[k])
+            if trials[step] > best:
+                calibration, best = moved(calibration, name, step, units), trials[step]
+    return calibration, best
+
+
+def moved(calibration: Calibration, name: str, step: float, units: dict[str, float]) -> Calibration:
+    """One value moved by ``step`` units; a sigma by a third of that in its logarithm."""
+    value = getattr(calibration, name)
+    new = value * np.exp(step / 3) if name in NOISES else value + step * units[name]
+    return replace(calibration, **{name: float(new)})
 
 
 def _summit(low: float, middle: float, high: float) -> float:
@@ -160,22 +177,20 @@ def repeated_sightings(log: SlamLog, within: float = 0.5) -> dict[str, float | i
 
 
 def identify(logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]) -> dict[str, Any]:
-    """Alternate the two steps; returns the document that is committed."""
-    calibration = start
-    history = []
-    batches: list[Batch] = []
-    for number in range(1, ROUNDS + 1):
-        calibration, batches = fit_gains(logs, calibration, free, SETTINGS)
-        calibration, likelihood = fit_noises(logs, calibration, SETTINGS)
-        history.append({"log_likelihood": likelihood, **asdict(calibration)})
-        print(f"round {number} of {ROUNDS}: log likelihood {likelihood:.1f}", file=sys.stderr)
+    """Both steps; returns the document that is committed."""
+    after_batch, batches = fit_gains(logs, start, free)
+    _, cov = pooled_gains(batches)
+    units = dict(zip(free, np.sqrt(np.diag(cov)).tolist(), strict=True))
+    calibration, likelihood = most_likely(logs, after_batch, units)
     return {
         "values": asdict(calibration),
-        "method": " ".join((__doc__ or "").split("\n\n")[2].split()),
+        "method": " ".join((__doc__ or "").partition("Two steps, ")[2].split()),
         "evidence": {
             "truth_used": False,
+            "log_likelihood": likelihood,
+            "after_batch": asdict(after_batch),
+            "standard_errors": units,
             "logs": [_evidence(log, calibration, batch) for log, batch in zip(logs, batches, strict=True)],
-            "rounds": history,
         },
     }
 

@@ -152,8 +152,8 @@ def _show(value: Any) -> str:
     return str(value) if isinstance(value, int) else f"{value:.4g}"
 
 
-_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; color: #1b1b1b;
-  background: #fff; }
+_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
+  color: #1b1b1b; background: #fff; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { border: 1px solid #c8c8c8; padding: .3rem .6rem; text-align: right; }
 th:first-child { text-align: left; } th { background: #f3f3f3; } img { max-width: 100%; height: auto; }"""
@@ -170,11 +170,13 @@ def page(content: Mapping[str, Any], title: str, errors: bool) -> str:
         for row in rows
     )
     dropped = ", ".join(f"{n} {what}" for what, n in content["dropped"].items()) or "none"
-    notes = f"{content['sightings']} sightings; dropped by the reader: {dropped}. Reference: {content['truth'] or 'none'}."
+    notes = f"{content['sightings']} sightings; dropped by the reader: {dropped}. "
+    notes += f"Reference: {content['truth'] or 'none'}."
     figure = '<p><img src="errors.svg" alt="Errors with 3 sigma bands"></p>\n' if errors else ""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n"
         f"<h1>{escape(title)}</h1>\n<p>{escape(notes)}</p>\n"
         f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"

@@ -67,7 +67,7 @@ class Placed(NamedTuple):
         NaN where the covariance is singular: at a start that is certain.
         """
         e, values = self.errors[:, :, None], np.full(len(self.times), np.nan)
-        ok = np.isfinite(self.covs).all((1, 2))
+        ok: NDArray[np.bool_] = np.asarray(np.isfinite(self.covs).all((1, 2)))
         ok[ok] = np.linalg.eigvalsh(self.covs[ok])[:, 0] > 0
         values[ok] = np.sum(e[ok] * np.linalg.solve(self.covs[ok], e[ok]), (1, 2))
         return values
