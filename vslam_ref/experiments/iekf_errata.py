@@ -110,7 +110,7 @@ def simulate(task: Task) -> tuple[Array, Array]:
 def turned(world: VehicleField, angle: float) -> VehicleField:
     """The same world in axes turned by ``angle`` radians: all relative places stay."""
     poses = se2.compose(np.array([0.0, 0.0, angle]), world.poses)
-    return world._replace(poses=poses, landmarks=so2.act(angle, world.landmarks))
+    return world._replace(poses=poses, landmarks=so2.rotate(angle, world.landmarks))
 
 
 def run(config: ErrataConfig, context: RunContext) -> Result:

@@ -15,7 +15,7 @@ axle, too.
 
 Numbers: the configuration file of the simulator (V = 3 m/s, L = 4 m, 0.3 m/s, 3 degrees, 0.1 m, 1 degree,
 30 m, 40 Hz controls, 5 Hz sightings, two loops, P0 = 0).  Waypoints and landmarks are this module's own: a
-loop of some 340 m with bends to both sides.
+loop of some 380 m with bends to both sides.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ class WaypointConfig:
     waypoints: tuple[float, ...] = _assume(
         (20, -2, 50, -6, 66, 14, 56, 38, 66, 62, 44, 78, 18, 64, -10, 76, -36, 62, -28, 34, -40, 10, -14, -4),
         "m",
-        "not given as text; x, y of a loop of some 340 m, with bends to both sides",
+        "not given as text; x, y of a loop of some 380 m, with bends to both sides",
     )
-    landmarks: int = _assume(35, "", "not given as text; one on every 10 m of the loop")
+    landmarks: int = _assume(35, "", "not given as text; one on every 11 m of the loop")
     margin: float = _assume(15.0, "m", "not given; landmarks lie up to half the range outside the waypoints")
 
     def __post_init__(self) -> None:
@@ -75,7 +75,9 @@ class WaypointConfig:
             if not getattr(self, name) >= 0:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must be >= 0")
         if len(self.waypoints) % 2 or len(self.waypoints) < 6:
-            raise ValueError(f"waypoints: need x, y of three points or more, got {len(self.waypoints)} numbers")
+            raise ValueError(
+                f"waypoints: need x, y of three points or more, got {len(self.waypoints)} numbers"
+            )
         if not self.max_steer < np.pi / 2:
             raise ValueError(f"max_steer={self.max_steer}: must be less than pi / 2")
 
@@ -162,7 +164,9 @@ def _drive(config: WaypointConfig, points: Array) -> tuple[Array, Array]:
                 raise ValueError(f"waypoints: {target.tolist()} is never reached; bend the course less")
             allowed -= 1
             ahead = float(so2.wrap(np.arctan2(*(target - pose[:2])[::-1]) - pose[2]))
-            steer = float(np.clip(ahead, max(steer - turn, -config.max_steer), min(steer + turn, config.max_steer)))
+            steer = float(
+                np.clip(ahead, max(steer - turn, -config.max_steer), min(steer + turn, config.max_steer))
+            )
             controls.append((config.speed, steer))
             rear = config.speed * np.cos(steer)
             pose = vehicle.propagate(pose, vehicle.ackermann((rear, steer), config.wheelbase, config.dt))

@@ -9,6 +9,10 @@ module                        holds
 ``worlds``                    draws of runs, and worlds in which a claim is false
 ``evaluate``                  thresholds, shares, intervals and null rates of many claims in one pass
 ``judge``                     the verdict rule, and the door: per-run arrays in, claims out
+``study``, ``figures``        the Monte Carlo study, and what the experiments of the three figures share
+``grid``, ``sensitivity``     the settings of the sensitivity study, and one of them run and judged
+``grid_rules``                what the grid as a whole says
+``neighbours``                what the experiments on other public setups share
 ============================  =====================================================================
 """
 

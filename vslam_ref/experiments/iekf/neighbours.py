@@ -1,0 +1,257 @@
+"""Other public setups: what their two experiments share.
+
+::
+
+    Drive (increments, sightings, truth) --follow--> Errors per run --common_claims--> verdicts
+
+The starts are ``zero``, P0 = 0 as published, and ``high``, the high P0 of seed B.  At ``zero`` the anchored
+EKF *is* the EKF: what either study shows there, P0 cannot explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.experiments.framework import Claim, verdict
+from vslam_ref.experiments.iekf.rules import APART, MARKED, MUCH
+from vslam_ref.filters.carleman_ekf import ReducedCarlemanEkf, carleman_ekf
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
+from vslam_ref.filters.estimates import SlamFilter
+from vslam_ref.filters.vehicle import Increment
+from vslam_ref.metrics.consistency import bootstrap_interval, nees, pose_error
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FILTERS = ("ekf", "iekf", "ekf-anchored")
+STARTS = ("zero", "high")
+SETTLE = 10
+"""Records at the start without a NEES: from P0 = 0 the covariance of the first is singular."""
+LONGER = 1.01
+"""A heading vector this long makes the IEKF predict steps 1 % too long; at B's setting it ends at 1.02."""
+SAME = 1e-9
+"""Metres and radians; two filters that differ by less are one."""
+
+
+class Drive(NamedTuple):
+    """What B runs of a filter are fed, and the truth (T + 1, 3).
+
+    ``increments`` (B, T), (B, T), (B, T, 2, 2); ``seen``: step -> ids (m,), z (B, m, 2), cov_z; every
+    ``every``-th pose is recorded.
+    """
+
+    increments: Increment
+    seen: Mapping[int, tuple[IntArray, Array, Array]]
+    truth: Array
+    every: int
+
+
+class Errors(NamedTuple):
+    """Errors (M, R) of heading (rad) and position (m), and NEES per freedom of pose, heading, position.
+
+    The first :data:`SETTLE` columns of a NEES are NaN.  ``stretch`` is the length of the IEKF's heading
+    vector (z3, z4), which should be 1; the other filters have an angle, and 1.
+    """
+
+    heading: Array
+    position: Array
+    nees: Array
+    nees_heading: Array
+    nees_position: Array
+    stretch: Array
+
+
+def make_filter(name: str, mean: Array, cov: Array, capacity: int) -> SlamFilter:
+    """Build a filter by its name in the series, started at N(mean (B, 3), cov (3, 3))."""
+    if name == "iekf":
+        return carleman_ekf(mean, cov, capacity=capacity)
+    return AnchoredEkf(mean, cov, capacity) if name == "ekf-anchored" else EkfSlam(mean, cov, capacity)
+
+
+def follow(slam: SlamFilter, drive: Drive) -> Errors:
+    """Take a filter along a drive and keep its errors."""
+    ds, dalpha, cov_u = drive.increments
+    T = ds.shape[1]
+    means, covs, lengths = [], [], []
+    for k in range(T + 1):
+        if k:
+            slam.predict(Increment(ds[:, k - 1], dalpha[:, k - 1], cov_u[:, k - 1]))
+        if k in drive.seen:
+            slam.update(*drive.seen[k])
+        if k % drive.every == 0:
+            mean, cov = slam.pose()
+            means.append(mean)
+            covs.append(cov)
+            lengths.append(_stretch(slam))
+    error = pose_error(drive.truth[: T + 1 : drive.every, None], np.array(means))
+    return _errors(error, np.array(covs), np.array(lengths))
+
+
+def _stretch(slam: SlamFilter) -> Array:
+    """Length (B,) of the heading vector."""
+    if isinstance(slam, ReducedCarlemanEkf):
+        return np.hypot(slam.blocks.x_p[:, 2], slam.blocks.x_p[:, 3])
+    return np.ones(len(slam.pose().mean))
+
+
+def _errors(error: Array, cov: Array, stretch: Array) -> Errors:
+    """Errors (R, B, 3) in (x, y, theta), covariances and heading vectors (R, B) as :class:`Errors`."""
+    parts = {"nees": slice(0, 3), "nees_heading": slice(2, 3), "nees_position": slice(0, 2)}
+    squares = {}
+    for name, at in parts.items():
+        value = nees(error[..., at], cov[..., at, at]).value / (at.stop - at.start)
+        value[:SETTLE] = np.nan
+        squares[name] = value.T.copy()
+    position = np.hypot(error[..., 0], error[..., 1])
+    return Errors(error[..., 2].T.copy(), position.T.copy(), stretch=stretch.T.copy(), **squares)
+
+
+def join(parts: list[Errors]) -> Errors:
+    """Put batches of runs together."""
+    return Errors(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def rmse(error: Array) -> float:
+    """Root mean square over all runs and times, the published statistic."""
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def last(x: Array) -> Array:
+    """Average of each run over the last tenth of the course, (M,)."""
+    return np.asarray(x[:, -max(1, x.shape[1] // 10) :].mean(axis=1))
+
+
+def table(errors: Mapping[str, Errors]) -> dict[str, dict[str, float]]:
+    """RMSE (degrees, metres) and NEES per freedom, over the whole course and its last tenth, by key."""
+    return {
+        key: {
+            "rmse_heading_deg": float(np.rad2deg(rmse(e.heading))),
+            "rmse_position_m": rmse(e.position),
+            "nees_heading": float(e.nees_heading[:, SETTLE:].mean()),
+            "nees_position": float(e.nees_position[:, SETTLE:].mean()),
+            "nees_pose": float(e.nees[:, SETTLE:].mean()),
+            "nees_pose_end": float(last(e.nees).mean()),
+            "stretch_end": float(last(e.stretch).mean()),
+        }
+        for key, e in errors.items()
+    }
+
+
+def series_of(time: Array, errors: Mapping[str, Errors]) -> dict[str, object]:
+    """Collect curves over time: RMSE over runs, and mean NEES per freedom; None where there is none."""
+    return {
+        "time": time,
+        "rmse_heading": {k: np.sqrt(np.mean(e.heading**2, axis=0)) for k, e in errors.items()},
+        "rmse_position": {k: np.sqrt(np.mean(e.position**2, axis=0)) for k, e in errors.items()},
+        "nees": {k: e.nees.mean(axis=0) for k, e in errors.items()},
+        "summary": table(errors),
+    }
+
+
+class Question(NamedTuple):
+    """A claim on the last tenth of the course: mean of ``first`` over that of ``second`` (or over 1).
+
+    It holds when the 95 % whole-run interval lies ``above`` the bound, or else at or below it.
+    """
+
+    id: str
+    text: str
+    quantity: str
+    first: str
+    second: str | None
+    above: bool
+    bound: float
+
+    def rule(self) -> str:
+        """Return the rule in words."""
+        over = f" over {self.second}" if self.second else ""
+        return (
+            f"{self.quantity} of {self.first}{over}, means over the last tenth of the course: 95 % whole-run "
+            f"interval {'>' if self.above else '<='} {self.bound:g}"
+        )
+
+
+QUESTIONS = (
+    Question(
+        "zero-ekf-overconfident", "With a known start, P0 = 0, the EKF ends overconfident",
+        "nees", "ekf/zero", None, True, MARKED,
+    ),
+    Question(
+        "zero-iekf-better", "With a known start B's IEKF ends more consistent than the EKF",
+        "nees", "ekf/zero", "iekf/zero", True, 1.0,
+    ),
+    Question(
+        "high-iekf-much-better", "With B's high P0 the IEKF ends much more consistent than the EKF",
+        "nees", "ekf/high", "iekf/high", True, MUCH,
+    ),
+    Question(
+        "high-anchored-not-worse", "With B's high P0 the anchored EKF ends no less consistent than the IEKF",
+        "nees", "ekf-anchored/high", "iekf/high", False, APART,
+    ),
+    Question(
+        "zero-iekf-stretches", "The IEKF's heading vector grows, so that it predicts its steps too long",
+        "stretch", "iekf/zero", None, True, LONGER,
+    ),
+)  # fmt: skip
+"""What both setups are asked; fixed before the runs."""
+
+
+def common_claims(
+    source: str, errors: Mapping[str, Errors], enough: bool, rng: np.random.Generator
+) -> list[Claim]:
+    """Judge what both setups are asked.
+
+    Parameters
+    ----------
+    source : str
+    errors : mapping
+        "filter/start" -> Errors, the same runs in each.
+    enough : bool
+        Whether the course and the number of runs allow a verdict.
+    rng : Generator
+        For intervals over whole runs.
+    """
+    judged = [answer(q, source, errors, enough, rng) for q in QUESTIONS]
+    return [*judged, anchored_is_ekf(source, errors)]
+
+
+def answer(
+    q: Question, source: str, errors: Mapping[str, Errors], enough: bool, rng: np.random.Generator
+) -> Claim:
+    """Judge one question."""
+    a = last(getattr(errors[q.first], q.quantity))
+    b = last(getattr(errors[q.second], q.quantity)) if q.second else np.ones(len(a))
+    low, high = bootstrap_interval(np.stack([a, b], 1), lambda c: c[:, 0] / c[:, 1], rng)
+    holds = low > q.bound if q.above else high <= q.bound
+    measured: dict[str, object] = {"value": float(a.mean() / b.mean())}
+    if "iekf" in f"{q.first} {q.second}" and q.quantity == "nees":
+        start = q.first.partition("/")[2]
+        measured["iekf_heading_vector"] = float(last(errors[f"iekf/{start}"].stretch).mean())
+    if not enough:
+        measured["reason"] = "too few runs, or too short a course"
+    elif not holds:
+        side = ">" if q.above else "<="
+        measured["reason"] = f"the interval is [{low:.4g}, {high:.4g}], not all of it {side} {q.bound:g}"
+    outcome = verdict(holds if enough else None)
+    return Claim(q.id, source, q.text, q.rule(), measured, [low, high], None, None, outcome)
+
+
+def anchored_is_ekf(source: str, errors: Mapping[str, Errors]) -> Claim:
+    """With nothing to keep apart, the anchored EKF has no effect."""
+    a, b = errors["ekf-anchored/zero"], errors["ekf/zero"]
+    gap = float(max(np.abs(a.heading - b.heading).max(), np.abs(a.position - b.position).max()))
+    return Claim(
+        "zero-anchored-is-ekf",
+        source,
+        "With a known start the anchored EKF is the EKF",
+        f"largest difference of heading and position errors over all runs and times <= {SAME:g}",
+        {"largest": gap},
+        None,
+        None,
+        None,
+        verdict(gap <= SAME),
+    )
