@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import NoReturn
 
 import vslam_ref
-from vslam_ref.commands import bench, data, reproduce, warm_cache
+from vslam_ref.commands import bench, data, evaluate, reproduce, warm_cache
 from vslam_ref.commands import list as list_command
 from vslam_ref.commands import run as run_command
 
@@ -34,6 +34,7 @@ COMMANDS: dict[str, ModuleType] = {
     "list": list_command,
     "reproduce": reproduce,
     "run": run_command,
+    "evaluate": evaluate,
     "data": data,
     "bench": bench,
     "warm-cache": warm_cache,

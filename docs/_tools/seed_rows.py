@@ -23,7 +23,7 @@ def _numbered(prefix: str, first: int, last: int) -> tuple[str, ...]:
 
 
 ROWS = (
-    Row(("A1.1",), "world point in a camera's frame", 1),
+    Row(("A1.1",), "world point in a camera's frame", 2),
     Row(("A1.2", "A1.3"), "pinhole projection", 3),
     Row(("A1.4",), "bundle adjustment's objective", 6, erratum=True),
     Row(("A fig 1.1",), "several views of one scene", 1),

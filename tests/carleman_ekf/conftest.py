@@ -238,7 +238,7 @@ def field() -> Callable[..., Field]:
             for s, e in zip(world.sightings, noise.sightings, strict=True)
         }
         truth = se2.compose([0.0, 0.0, turn], world.poses)
-        start = np.concatenate([so2.act(turn, noise.start[:, :2]), noise.start[:, 2:]], 1)
+        start = np.concatenate([so2.rotate(turn, noise.start[:, :2]), noise.start[:, 2:]], 1)
         return Field(truth, steps, seen, config.cov_z, start)
 
     return build

@@ -148,3 +148,4 @@ def test_the_gps_rule_keeps_most_fixes_and_only_positions() -> None:
     assert 3000 < len(truth.times) < 4466
     assert np.isnan(truth.poses[:, 2]).all()
     assert not truth.exact
+    assert truth.lever.tolist() == [park.ANTENNA_AHEAD, 0.0]

@@ -72,7 +72,7 @@ def test_exp_is_the_matrix_exponential(angle: float) -> None:
 
 @given(st.floats(-np.pi, np.pi), st.floats(-10, 10), st.floats(-10, 10))
 def test_act_is_the_matrix_product(angle: float, x: float, y: float) -> None:
-    assert np.abs(so2.act(angle, [x, y]) - so2.exp(angle) @ [x, y]).max() <= 4 * EPS * (abs(x) + abs(y))
+    assert np.abs(so2.rotate(angle, [x, y]) - so2.exp(angle) @ [x, y]).max() <= 4 * EPS * (abs(x) + abs(y))
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -83,7 +83,7 @@ def test_batches_are_the_single_results(batch: tuple[int, ...]) -> None:
     assert so2.wrap(phi).shape == batch
     assert R.shape == (*batch, 2, 2)
     assert so2.log(R).shape == batch
-    assert so2.act(phi, x).shape == (*batch, 2)
+    assert so2.rotate(phi, x).shape == (*batch, 2)
     assert so2.nearest(R).shape == (*batch, 2, 2)
     for i in np.ndindex(batch):
         assert np.abs(R[i] - so2.exp(phi[i])).max() <= EPS

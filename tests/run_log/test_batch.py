@@ -96,7 +96,7 @@ def test_the_batch_is_at_least_as_likely_as_the_filters_and_as_accurate(
         start = run_log(log, calibration, "ekf", CERTAIN)
         batch = solve_batch(log, calibration, start)
         assert batch.converged
-        run = compare.as_run(batch, start)
+        run = compare.as_run(batch, log, start.times)
         gains.append(summary(start, truth)["rmse_position_m"] - summary(run, truth)["rmse_position_m"])
     assert np.mean(gains) > 0
 
@@ -107,7 +107,7 @@ def test_batch_poses_stand_at_the_sightings(
     log, _ = read(make_world, calibration)
     start = run_log(log, calibration, "ekf", replace(CERTAIN, record_period=0.5))
     batch = solve_batch(log, calibration, start)
-    run = compare.as_run(batch, start)
+    run = compare.as_run(batch, log, start.times)
     at = np.isin(run.times.round(6), batch.times.round(6))
     there = np.isin(batch.times.round(6), run.times.round(6))
     assert at.sum() > 50

@@ -92,7 +92,15 @@ def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
             )
     pose = poses.values[:, 1:].copy()
     pose[:, 2] = so2.wrap(pose[:, 2])
-    return Truth(poses.values[:, 0] - log.clock_start, pose, TRUTH_GAP, subjects, marks.values[:, 1:3], True)
+    return Truth(
+        times=poses.values[:, 0] - log.clock_start,
+        poses=pose,
+        max_gap=TRUTH_GAP,
+        ids=subjects,
+        landmarks=marks.values[:, 1:3],
+        lever=np.zeros(2),
+        exact=True,
+    )
 
 
 def read_barcodes(folder: Path) -> dict[int, int]:

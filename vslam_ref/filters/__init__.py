@@ -5,6 +5,7 @@ module                        holds
 ============================  =====================================================================
 ``vehicle``                   motion models (B4 and its alternative), increments and their noise
 ``observation``               a landmark seen from the vehicle (B20, B21) and its inverse (B23-B25)
+``range_bearing``             range and bearing converted without bias
 ``block_covariance``          the covariance in pose and map blocks, and its measurement update
 ``ekf_slam``                  EKF-SLAM, the anchored EKF and the ideal EKF
 ``carleman_ekf``              the *improved* EKF of seed B: a second-order Carleman lift.  It is

@@ -9,11 +9,13 @@ radians, translation first; the perturbation is on the left, T <- Exp(xi) T.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vslam_ref.geometry import so2
+from vslam_ref.geometry._arrays import Array, as_array, blocks
+from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
 
-Array = NDArray[np.float64]
+DOF = 3
 
 _SMALL = 0.05
 """Below this angle the series of :func:`_sinc_cosc` are used.
@@ -51,17 +53,31 @@ def matrix(pose: ArrayLike) -> Array:
     return T
 
 
+def hat(xi: ArrayLike) -> Array:
+    """Generator [[0, -phi, rho_x], [phi, 0, rho_y], [0, 0, 0]] of Exp(xi), shape (..., 3) -> (..., 3, 3)."""
+    xi = as_array("xi", xi, 3)
+    M = np.zeros((*xi.shape[:-1], 3, 3))
+    M[..., :2, :2], M[..., :2, 2] = so2.hat(xi[..., 2]), xi[..., :2]
+    return M
+
+
+def vee(M: ArrayLike) -> Array:
+    """Undo :func:`hat`, shape (..., 3, 3) -> (..., 3)."""
+    M = as_array("M", M, 3, 3)
+    return np.concatenate([M[..., :2, 2], so2.vee(M[..., :2, :2])[..., None]], -1)
+
+
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
     """Pose vector of the product ``T_a T_b`` (the seed's circled plus), shapes (..., 3)."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    t = a[..., :2] + so2.act(a[..., 2], b[..., :2])
+    t = a[..., :2] + so2.rotate(a[..., 2], b[..., :2])
     return np.concatenate([t, so2.wrap(a[..., 2] + b[..., 2])[..., None]], -1)
 
 
 def inverse(pose: ArrayLike) -> Array:
     """Pose vector of ``T^-1`` (the seed's circled minus), shape (..., 3)."""
     pose = np.asarray(pose, dtype=np.float64)
-    t = -so2.act(-pose[..., 2], pose[..., :2])
+    t = -so2.rotate(-pose[..., 2], pose[..., :2])
     return np.concatenate([t, so2.wrap(-pose[..., 2])[..., None]], -1)
 
 
@@ -73,7 +89,7 @@ def between(a: ArrayLike, b: ArrayLike) -> Array:
 def act(pose: ArrayLike, x: ArrayLike) -> Array:
     """Apply ``T`` (..., 3) to points ``x`` (..., 2)."""
     pose = np.asarray(pose, dtype=np.float64)
-    moved: Array = so2.act(pose[..., 2], x) + pose[..., :2]
+    moved: Array = so2.rotate(pose[..., 2], x) + pose[..., :2]
     return moved
 
 
@@ -107,6 +123,17 @@ def _half_cot(phi: Array) -> Array:
     half = phi / 2
     sinc, _ = _sinc_cosc(half)
     return np.cos(half) / sinc
+
+
+def ad(xi: ArrayLike) -> Array:
+    """Matrix of the Lie bracket, shape (..., 3) -> (..., 3, 3).
+
+    [[0, -phi, rho_y], [phi, 0, -rho_x], [0, 0, 0]].
+    """
+    xi = as_array("xi", xi, 3)
+    A = hat(xi)
+    A[..., 0, 2], A[..., 1, 2] = xi[..., 1], -xi[..., 0]
+    return A
 
 
 def adjoint(pose: ArrayLike) -> Array:
@@ -170,3 +197,62 @@ def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
     fraction = np.asarray(fraction, dtype=np.float64)[..., None]
     a = np.asarray(a, dtype=np.float64)
     return compose(a, exp(fraction * log(between(a, b))))
+
+
+def perturb(pose: ArrayLike, xi: ArrayLike) -> Array:
+    """Pose vector of Exp(xi) T, shapes (..., 3)."""
+    return compose(exp(xi), pose)
+
+
+def random(rng: np.random.Generator, shape: tuple[int, ...] = (), *, spread: float = 1.0) -> Array:
+    """Uniform angles, Gaussian translations of standard deviation ``spread`` (metres), shape (*shape, 3)."""
+    t = spread * rng.standard_normal((*shape, 2))
+    return np.concatenate([t, so2.wrap(rng.uniform(-np.pi, np.pi, (*shape, 1)))], -1)
+
+
+def nearest(M: ArrayLike) -> Array:
+    """Pose vector whose matrix is nearest to ``M (..., 3, 3)``, the last row ignored.
+
+    The angle is that of :func:`.so2.nearest` (ValueError where it is undefined); the translation stays.
+    """
+    M = as_array("M", M, 3, 3)
+    angle = so2.log(so2.nearest(M[..., :2, :2]))
+    return np.concatenate([M[..., :2, 2], angle[..., None]], -1)
+
+
+def act_with_jacobians(pose: ArrayLike, x: ArrayLike) -> Acted:
+    """Value and Jacobians of :func:`act`: J_point = R, J_pose = [I, S T x] (..., 2, 3).
+
+    S = [[0, -1], [1, 0]].
+    """
+    pose = as_array("pose", pose, 3)
+    value = act(pose, x)
+    turned = np.stack([-value[..., 1], value[..., 0]], -1)[..., None]
+    J_point = np.broadcast_to(so2.exp(pose[..., 2]), (*value.shape, 2))
+    return Acted(value, blocks([[np.eye(2), turned]]), J_point)
+
+
+def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
+    """Value and Jacobians of :func:`compose`: I in a, Ad_a in b."""
+    value = compose(a, b)
+    shape = (*value.shape, DOF)
+    return Combined(value, np.broadcast_to(np.eye(DOF), shape), np.broadcast_to(adjoint(a), shape))
+
+
+def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
+    """Value and Jacobians of :func:`between`: -Ad of T_a^-1 in a, Ad of T_a^-1 in b."""
+    value = between(a, b)
+    J_b = np.broadcast_to(adjoint(inverse(a)), (*value.shape, DOF))
+    return Combined(value, -J_b, J_b)
+
+
+def inverse_with_jacobians(pose: ArrayLike) -> Mapped:
+    """Value and Jacobian of :func:`inverse`: -Ad of T^-1."""
+    value = inverse(pose)
+    return Mapped(value, -adjoint(value))
+
+
+def log_with_jacobians(pose: ArrayLike) -> Mapped:
+    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
+    xi = log(pose)
+    return Mapped(xi, left_jacobian_inverse(xi))

@@ -1,15 +1,18 @@
 """SO(2), the rotations of the plane.
 
-An element is stored as its angle (radians, wrapped to (-pi, pi]) or as a 2 x 2 matrix.  All
-functions take any batch shape ``(...)``.
+An element is a 2 x 2 matrix; its tangent is one number, the angle in radians, shape (...) and not (..., 1).
+Jacobians are 1 x 1 matrices.  Where only angles are at hand, :func:`wrap` and :func:`rotate` spare the
+matrix.  All functions take any batch shape ``(...)``.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vslam_ref.geometry._arrays import Array, as_array, times, transpose
+
+DOF = 1
 
 
 def wrap(angle: ArrayLike) -> Array:
@@ -54,11 +57,89 @@ def log(R: ArrayLike) -> Array:
     return angle
 
 
-def act(phi: ArrayLike, x: ArrayLike) -> Array:
+def rotate(phi: ArrayLike, x: ArrayLike) -> Array:
     """Rotate points ``x (..., 2)`` by angles ``phi (...)``."""
     phi, x = np.asarray(phi, dtype=np.float64), np.asarray(x, dtype=np.float64)
     c, s = np.cos(phi), np.sin(phi)
     return np.stack([c * x[..., 0] - s * x[..., 1], s * x[..., 0] + c * x[..., 1]], -1)
+
+
+def identity(shape: tuple[int, ...] = ()) -> Array:
+    """Identity rotations, shape (*shape, 2, 2)."""
+    return np.broadcast_to(np.eye(2), (*shape, 2, 2)).copy()
+
+
+def matrix(R: ArrayLike) -> Array:
+    """The element as a matrix: itself, shape (..., 2, 2)."""
+    return as_array("R", R, 2, 2)
+
+
+def hat(phi: ArrayLike) -> Array:
+    """Generator ``[[0, -phi], [phi, 0]]``, shape (...) -> (..., 2, 2)."""
+    phi = np.asarray(phi, dtype=np.float64)
+    generator: Array = phi[..., None, None] * np.array([[0.0, -1.0], [1.0, 0.0]])
+    return generator
+
+
+def vee(Phi: ArrayLike) -> Array:
+    """Undo :func:`hat`, shape (..., 2, 2) -> (...)."""
+    Phi = as_array("Phi", Phi, 2, 2)
+    return np.asarray((Phi[..., 1, 0] - Phi[..., 0, 1]) / 2)
+
+
+def compose(a: ArrayLike, b: ArrayLike) -> Array:
+    """Product R_a R_b, shapes (..., 2, 2)."""
+    return np.asarray(as_array("a", a, 2, 2) @ as_array("b", b, 2, 2))
+
+
+def inverse(R: ArrayLike) -> Array:
+    """Transpose, shape (..., 2, 2)."""
+    return transpose(as_array("R", R, 2, 2)).copy()
+
+
+def between(a: ArrayLike, b: ArrayLike) -> Array:
+    """R_a^-1 R_b, shapes (..., 2, 2)."""
+    return compose(inverse(a), b)
+
+
+def act(R: ArrayLike, x: ArrayLike) -> Array:
+    """Turn points ``x (..., 2)`` by matrices ``R (..., 2, 2)``."""
+    return times(as_array("R", R, 2, 2), as_array("x", x, 2))
+
+
+def ad(phi: ArrayLike) -> Array:
+    """Matrix of the Lie bracket, shape (...) -> (..., 1, 1): zero, as turns of the plane commute."""
+    return np.zeros((*np.shape(phi), 1, 1))
+
+
+def adjoint(R: ArrayLike) -> Array:
+    """Matrix with R Exp(phi) R^-1 = Exp(Ad phi), shape (..., 2, 2) -> (..., 1, 1): one."""
+    return np.ones((*as_array("R", R, 2, 2).shape[:-2], 1, 1))
+
+
+def left_jacobian(phi: ArrayLike) -> Array:
+    """J with Exp(phi + d) = Exp(J d) Exp(phi), shape (...) -> (..., 1, 1): one."""
+    return np.ones((*np.shape(phi), 1, 1))
+
+
+def left_jacobian_inverse(phi: ArrayLike) -> Array:
+    """Inverse of :func:`left_jacobian`, shape (...) -> (..., 1, 1): one."""
+    return np.ones((*np.shape(phi), 1, 1))
+
+
+def perturb(R: ArrayLike, phi: ArrayLike) -> Array:
+    """Exp(phi) R, shapes (..., 2, 2) and (...)."""
+    return compose(exp(phi), R)
+
+
+def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
+    """Turn at constant speed from a (fraction 0) to b (1), the short way round; shapes (..., 2, 2), (...)."""
+    return compose(a, exp(np.asarray(fraction, dtype=np.float64) * log(between(a, b))))
+
+
+def random(rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Array:
+    """Uniform rotations, shape (*shape, 2, 2)."""
+    return exp(rng.uniform(-np.pi, np.pi, shape))
 
 
 def nearest(M: ArrayLike) -> Array:

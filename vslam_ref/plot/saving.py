@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
 
-__all__ = ["Figure", "save_figure"]
+__all__ = ["FORMATS", "Figure", "figure_bytes", "save_figure"]
 
 PNG_DPI = 150
+FORMATS = ("png", "svg")
+
+
+def figure_bytes(figure: Figure, format: str, salt: str) -> bytes:
+    """Return a figure as the content of one file.
+
+    Parameters
+    ----------
+    figure : Figure
+    format : {"png", "svg"}
+    salt : str
+        As in :func:`save_figure`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such format.
+    """
+    if format not in FORMATS:
+        raise ValueError(f"figure format {format!r}: need one of {', '.join(FORMATS)}")
+    stream = BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": salt}):
+        more: dict[str, Any] = {"metadata": {"Date": None}} if format == "svg" else {"dpi": PNG_DPI}
+        figure.savefig(stream, format=format, **more)
+    return stream.getvalue()
 
 
 def save_figure(figure: Figure, folder: Path, salt: str, name: str = "figure") -> None:

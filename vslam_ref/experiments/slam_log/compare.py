@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from vslam_ref.datasets import catalogue, mrclam, noise, victoria_park
 from vslam_ref.experiments.framework.config import config_to_dict
 from vslam_ref.experiments.framework.errors import InputError, suggestion
 from vslam_ref.filters.estimates import MapEstimate
-from vslam_ref.geometry import se2
 from vslam_ref.systems.slam_log import (
     FILTERS,
     Calibration,
@@ -25,7 +24,12 @@ from vslam_ref.systems.slam_log import (
     run_log,
     summary,
 )
+from vslam_ref.systems.slam_log.evaluate import errors_while_blind
 from vslam_ref.systems.slam_log.runner import Seen
+from vslam_ref.systems.slam_log.timeline import build_timeline
+
+if TYPE_CHECKING:
+    from vslam_ref.experiments.slam_log.batch import Batch
 
 Array = NDArray[np.float64]
 
@@ -123,39 +127,31 @@ def compare(
         from vslam_ref.experiments.slam_log.batch import solve_batch
 
         start = runs["ekf"] if "ekf" in runs else run_log(source.log, config.calibration, "ekf", config.run)
-        bound = as_run(solve_batch(source.log, config.calibration, start), start)
+        bound = as_run(solve_batch(source.log, config.calibration, start), source.log, start.times)
     return Comparison(source, config, runs, bound)
 
 
-def as_run(batch: Any, like: LogRun) -> LogRun:
-    """A batch solution as a run, so that it is judged alike.
+def as_run(batch: Batch, log: SlamLog, times: Array) -> LogRun:
+    """A batch solution as a run with records at ``times``, so that it is judged alike.
 
-    Its poses stand at sightings; at the records of ``like`` they are that run's motion in between,
-    corrected by what the batch says at both ends (in the vehicle frame, linearly in time).  It has no
-    covariances: they are NaN.
+    Covariances are NaN: they are not computed.
     """
-    at_nodes = np.stack(
-        [np.interp(batch.times, like.times, column) for column in _unwrapped(like.poses).T], -1
-    )
-    local = se2.between(at_nodes, batch.poses)
-    steps = np.stack([np.interp(like.times, batch.times, column) for column in _unwrapped(local).T], -1)
-    poses = se2.compose(like.poses, steps)
-    covs = np.full((len(poses), 3, 3), np.nan)
-    marks = MapEstimate(batch.ids, batch.landmarks[None], np.full((1, len(batch.ids), 2, 2), np.nan))
-    none = np.zeros((len(batch.used), 2))
+    from vslam_ref.experiments.slam_log.preintegration import poses_between
+
+    line = build_timeline(log, batch.calibration, times)
+    poses = poses_between(line, batch.poses)
+    unknown = np.full((len(batch.ids), 2, 2), np.nan)
+    ids = np.concatenate([s.ids for s in log.sightings])
     seen = Seen(
-        none[:, 0],
-        none[:, 0].astype(np.int64),
-        none,
-        batch.sightings,
-        np.zeros((len(none), 2, 2)),
-        batch.used,
+        times=np.repeat(batch.times, [len(s.ids) for s in log.sightings]),
+        ids=ids,
+        polar=np.concatenate([s.polar for s in log.sightings]),
+        innovation=-batch.sightings,
+        S=np.full((len(ids), 2, 2), np.nan),
+        accepted=batch.used,
     )
-    return LogRun("batch", like.times, poses, covs, marks, seen)
-
-
-def _unwrapped(poses: Array) -> Array:
-    return np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
+    marks = MapEstimate(batch.ids, batch.landmarks[None], unknown[None])
+    return LogRun("batch", times, poses, np.full((len(times), 3, 3), np.nan), marks, seen)
 
 
 def document(comparison: Comparison, asked: str) -> dict[str, Any]:
@@ -175,6 +171,7 @@ def document(comparison: Comparison, asked: str) -> dict[str, Any]:
         "sightings": int(sum(len(s.ids) for s in source.log.sightings)),
         "dropped": dict(source.log.dropped),
         "truth": _truth_note(source.truth),
+        "blind": None if source.truth is None else errors_while_blind(comparison.runs[asked], source.truth),
         "config": config_to_dict(comparison.config),
     }
 

@@ -7,11 +7,12 @@ Two steps, on all logs of the set together:
 1. *gains and offsets* from a batch solution of each log with these values unknown.  A robot that sees
    one landmark twice, with a turn and a way in between, has measured its own odometry.  The logs'
    estimates are averaged with their information matrices, so all robots get the same values;
-2. *everything, noises above all*, where the innovations of the EKF are most likely.  An innovation's
-   covariance holds odometry noise, sensor noise and map; one that is too small or too large costs
-   likelihood.  One sighting in a hundred is allowed to be anything inside the sensor's field, or a
-   few misread barcodes would inflate every sigma.  One value at a time is moved to the summit of a
-   parabola, gains in units of their standard errors from step 1, sigmas in their logarithms.
+2. *everything, noises above all*, where the innovations of the EKF and of the IEKF together are most
+   likely: the values favour neither filter.  An innovation's covariance holds odometry noise, sensor
+   noise and map; one that is too small or too large costs likelihood.  One sighting in a hundred is
+   allowed to be anything inside the sensor's field, or a few misread barcodes would inflate every
+   sigma.  One value at a time is moved to the summit of a parabola, gains in units of their standard
+   errors from step 1, sigmas in their logarithms.
 
 What the values rest on is written beside them: both logs' own gains with standard errors, the
 likelihoods, and residuals of repeated sightings (the same landmark within half a second, from almost
@@ -31,6 +32,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.experiments.slam_log.batch import Batch, solve_batch
 from vslam_ref.systems.slam_log import Calibration, LogRun, RunSettings, SlamLog, run_log
+from vslam_ref.systems.slam_log.runner import iekf, iekf_first_order
 
 Array = NDArray[np.float64]
 
@@ -58,10 +60,12 @@ START = {
         sigma_distance=0.1, sigma_turn=0.1, sigma_drift=0.02, sigma_range=0.3, sigma_bearing=0.02
     ),
 }
+JUDGES = ("ekf", "iekf")
+"""Filters whose innovations are made likely, so that the values favour neither."""
 OUTLIERS = 0.01
 GATES = (13.816, 30.0, 60.0, 200.0, 1e9)
 """Tried at the end, to show what the gate of a run rests on."""
-STRIDES = (2.0, 1.0, 0.5)
+STRIDES = (2.0, 1.0, 0.5, 1.0, 0.5)
 """Units between the three points of a parabola, one sweep each."""
 SETTINGS = RunSettings(max_step=0.1, start_sigma_position=0.0, start_sigma_heading=0.0)
 """Faster than odometry rate; the start is the frame, so it is certain."""
@@ -124,8 +128,11 @@ def most_likely(
     areas = [field_area(log) for log in logs]
 
     def likelihood(trial: Calibration) -> float:
-        runs = (run_log(log, trial, "ekf", SETTINGS) for log in logs)
-        return sum(log_likelihood(run, area) for run, area in zip(runs, areas, strict=True))
+        return sum(
+            log_likelihood(run_log(log, trial, name, SETTINGS), area)
+            for name in JUDGES
+            for log, area in zip(logs, areas, strict=True)
+        )
 
     best = likelihood(calibration)
     for stride in STRIDES:
@@ -184,7 +191,7 @@ def identify(logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]) -
     calibration, likelihood = most_likely(logs, after_batch, units)
     return {
         "values": asdict(calibration),
-        "method": " ".join((__doc__ or "").partition("Two steps, ")[2].split()),
+        "method": "Two steps, " + " ".join((__doc__ or "").partition("Two steps, ")[2].split()),
         "evidence": {
             "truth_used": False,
             "log_likelihood": likelihood,
@@ -193,6 +200,11 @@ def identify(logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]) -
             "logs": [_evidence(log, calibration, batch) for log, batch in zip(logs, batches, strict=True)],
         },
     }
+
+
+def _neutral(calibration: Calibration, name: str) -> Calibration:
+    """Return the calibration with one gain at 1, or one offset at 0: what ignoring it costs."""
+    return replace(calibration, **{name: 1.0 if name.endswith("_gain") else 0.0})
 
 
 def _evidence(log: SlamLog, calibration: Calibration, batch: Batch) -> dict[str, Any]:
@@ -212,6 +224,14 @@ def _evidence(log: SlamLog, calibration: Calibration, batch: Batch) -> dict[str,
         "log_likelihood_by_gate": {
             str(gate): log_likelihood(run_log(log, calibration, "ekf", replace(SETTINGS, gate=gate)), area)
             for gate in GATES
+        },
+        "log_likelihood_iekf": {
+            moments: log_likelihood(run_log(log, calibration, build, SETTINGS), area)
+            for moments, build in (("gaussian", iekf), ("first_order", iekf_first_order))
+        },
+        "log_likelihood_without": {
+            name: log_likelihood(run_log(log, _neutral(calibration, name), "ekf", SETTINGS), area)
+            for name in batch.free
         },
         "nis_mean_of_2": float(nis.mean()),
         "nis_quantiles_50_90_99": np.quantile(nis, [0.5, 0.9, 0.99]).tolist(),

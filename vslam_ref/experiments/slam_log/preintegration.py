@@ -60,13 +60,29 @@ def preintegrate(line: Timeline, nodes: IntArray) -> RelativePoses:
     start, end = path[nodes[:-1]], path[nodes[1:]]
     R = np.zeros((len(start), 3, 3))
     R[:, :2, :2], R[:, 2, 2] = so2.exp(-start[:, 2]), 1.0
-    mean = np.column_stack([so2.act(-start[:, 2], (end - start)[:, :2]), so2.wrap(end[:, 2] - start[:, 2])])
+    place = so2.rotate(-start[:, 2], (end - start)[:, :2])
+    mean = np.column_stack([place, so2.wrap(end[:, 2] - start[:, 2])])
     return RelativePoses(mean, R @ world @ R.swapaxes(1, 2))
 
 
-def compose_chain(relative: Array, start: Array) -> Array:
-    """Poses (K, 3) from a start and K - 1 relative poses."""
-    poses = [np.asarray(start, dtype=np.float64)]
-    for step in relative:
-        poses.append(se2.compose(poses[-1], step))
-    return np.array(poses)
+def poses_between(line: Timeline, nodes: Array) -> Array:
+    """Poses (R, 3) at the records of ``line``, given those at its sightings, ``nodes`` (K, 3).
+
+    Between two nodes odometry is trusted but for what it misses at the end: the heading it misses is
+    spread evenly over the time between, and the place that is then still missed is spread likewise.
+    """
+    at, end = line.sighting_at, len(line.times) - 1
+    path = dead_reckoning(line.increments)
+    span = np.maximum(np.diff(line.times[at]), 1e-9)
+    missed = so2.wrap(np.diff(nodes[:, 2]) - np.diff(path[at, 2])) * (np.diff(line.times[at]) > 0)
+    rate = np.concatenate([[0.0], missed / span, [0.0]])
+    step_rate = rate[np.searchsorted(at, np.arange(end), side="right")]
+    turned = line.increments + np.stack([np.zeros(end), step_rate * np.diff(line.times)], -1)
+    path = dead_reckoning(turned)
+    ends = se2.compose(nodes[:-1], se2.between(path[at[:-1]], path[at[1:]]))
+    left = np.vstack([nodes[1:, :2] - ends[:, :2], np.zeros(2)])
+    k = np.clip(np.searchsorted(at, line.record_at, side="right") - 1, 0, len(at) - 1)
+    poses = se2.compose(nodes[k], se2.between(path[at[k]], path[line.record_at]))
+    since = np.maximum(line.times[line.record_at] - line.times[at[k]], 0.0)
+    poses[:, :2] += left[k] * (since / np.append(span, 1.0)[k])[:, None]
+    return poses

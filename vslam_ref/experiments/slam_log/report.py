@@ -28,6 +28,7 @@ from vslam_ref.geometry import se2, so2
 from vslam_ref.plot.saving import save_figure
 from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
 from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
+from vslam_ref.systems.slam_log.evaluate import reference_point
 
 Array = NDArray[np.float64]
 
@@ -103,9 +104,11 @@ def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
     shown = place(run, truth, aligned=False) if truth is not None and truth.exact else aligned
     R = so2.exp(T[2])
     empty = np.zeros((0, 3))
+    lever = truth.lever if truth is not None else np.zeros(2)
+    at, _ = reference_point(run.poses, run.covs, lever)
     return Drawn(
         name=run.filter,
-        path=se2.compose(T, run.poses)[:, :2],
+        path=se2.compose(T, at)[:, :2],
         landmarks=se2.act(T, run.map.mean[0]),
         landmark_cov=R @ run.map.cov[0] @ R.T,
         times=shown.times if shown is not None else empty[:, 0],

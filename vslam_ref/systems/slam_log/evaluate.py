@@ -94,7 +94,7 @@ def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
     Returns None where the truth cannot tell: no overlap in time, or, unaligned, no true heading.
     """
     ok, true = truth_at(truth, run.times)
-    poses, covs = run.poses[ok], run.covs[ok]
+    poses, covs = reference_point(run.poses[ok], run.covs[ok], truth.lever)
     if aligned:
         if len(true) < 2:
             return None
@@ -106,6 +106,39 @@ def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
     R = np.eye(3)
     R[:2, :2] = so2.exp(T[2])
     return Placed(T, run.times[ok], se2.compose(T, poses), R @ covs @ R.T, true)
+
+
+def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Array]:
+    """Poses (N, 3) and covariances (N, 3, 3) of the point at ``lever`` (2,) in the vehicle frame."""
+    arm = so2.rotate(poses[:, 2], np.broadcast_to(lever, (len(poses), 2)))
+    J = np.tile(np.eye(3), (len(poses), 1, 1))
+    J[:, 0, 2], J[:, 1, 2] = -arm[:, 1], arm[:, 0]
+    moved = np.column_stack([poses[:, :2] + arm, poses[:, 2]])
+    return moved, J @ covs @ J.swapaxes(1, 2)
+
+
+def errors_while_blind(run: LogRun, truth: Truth, after: float = 5.0) -> dict[str, float | None]:
+    """Errors while landmarks are in sight, and more than ``after`` seconds behind the last sighting.
+
+    Returns
+    -------
+    dict
+        ``share`` of blind records; ``rmse_position_seeing_m`` and ``rmse_position_blind_m``, one alignment.
+    """
+    result: dict[str, float | None] = dict.fromkeys(
+        ("share", "rmse_position_seeing_m", "rmse_position_blind_m")
+    )
+    placed = place(run, truth, aligned=True)
+    seen = run.seen.times[run.seen.accepted]
+    if placed is None or not len(seen):
+        return result
+    last = np.searchsorted(seen, placed.times, side="right") - 1
+    since = np.where(last >= 0, placed.times - seen[np.maximum(last, 0)], np.inf)
+    blind, errors = since > after, placed.errors[:, :2]
+    result["share"] = float(np.mean(blind))
+    for name, chosen in (("rmse_position_seeing_m", ~blind), ("rmse_position_blind_m", blind)):
+        result[name] = root_mean_square(errors[chosen]) if chosen.any() else None
+    return result
 
 
 def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:

@@ -81,6 +81,8 @@ class Truth(NamedTuple):
         Between two samples further apart than this, seconds, there is no truth.
     ids, landmarks : ndarray, shapes (n,) and (n, 2)
         True map; empty where there is none.
+    lever : ndarray, shape (2,)
+        The point whose position is given, in the vehicle frame, metres: where the antenna stands.
     exact : bool
         Whether errors against it are the estimate's own (motion capture), or also the reference's (GPS).
     """
@@ -90,4 +92,5 @@ class Truth(NamedTuple):
     max_gap: float
     ids: IntArray
     landmarks: Array
+    lever: Array
     exact: bool

@@ -34,11 +34,27 @@ IntArray = NDArray[np.int64]
 Build = Callable[[Array, Array, int], SlamFilter]
 
 
-def _iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
-    return carleman_ekf(mean, cov, form="reduced-map", capacity=capacity)
+def iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
+    """Seed B's filter with its map, and with exact Gaussian moments.
+
+    A heading that has become uncertain by e.g. 0.4 rad shortens the mean of the heading vector.  With
+    first-order moments it keeps its length, and a linear correction then makes it, and every landmark's
+    distance with it, too long.  :func:`iekf_first_order` shows what that costs.
+    """
+    return _carleman(mean, cov, capacity, "gaussian")
 
 
-FILTERS: Mapping[str, Build] = {"ekf": EkfSlam, "iekf": _iekf, "ekf-anchored": AnchoredEkf}
+def iekf_first_order(mean: Array, cov: Array, capacity: int) -> SlamFilter:
+    """Seed B's filter with its map, P0 and the control noise lifted by the Jacobian."""
+    return _carleman(mean, cov, capacity, "first_order")
+
+
+def _carleman(mean: Array, cov: Array, capacity: int, moments: str) -> SlamFilter:
+    form = "reduced-map"
+    return carleman_ekf(mean, cov, form=form, capacity=capacity, start=moments, control=moments)
+
+
+FILTERS: Mapping[str, Build] = {"ekf": EkfSlam, "iekf": iekf, "ekf-anchored": AnchoredEkf}
 """Name in results -> how to build the filter from start mean (3,), covariance (3, 3) and capacity."""
 
 

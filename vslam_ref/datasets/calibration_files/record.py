@@ -1,0 +1,72 @@
+"""What a calibration file says about one camera, and the conversion of relative parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.geometry.cameras import Camera
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """One camera of a calibration file.
+
+    Parameters
+    ----------
+    camera : Camera
+        Intrinsics, pixels; (0, 0) is the centre of the top-left pixel.
+    size : (int, int) or None
+        Width and height of the images, pixels; None where the file does not say.
+    T_cam_rig : ndarray, shape (4, 4), or None
+        Rigid motion from the rig (EuRoC's body, Kalibr's IMU) to the camera, metres; None where not given.
+    name : str
+        The camera's name in the file.
+    """
+
+    camera: Camera
+    size: tuple[int, int] | None = None
+    T_cam_rig: Array | None = None
+    name: str = ""
+
+
+def pixels_from_relative(relative: float, size: int, *, centre: bool) -> float:
+    """Turn a number relative to the image's width or height into pixels.
+
+    Implements :eq:`eq-half-pixel`.
+
+    A relative position runs from 0 at the image's outer left edge to 1 at its outer right edge.  Those edges
+    are u = -1/2 and u = W - 1/2, because whole numbers are centres of pixels: u = c W - 1/2.  A focal length
+    is a difference of positions, so it has no shift: f W.
+
+    Parameters
+    ----------
+    relative : float
+        The number in the file.
+    size : int
+        Width (for u) or height (for v), pixels.
+    centre : bool
+        True for a position, False for a focal length.
+
+    Examples
+    --------
+    >>> pixels_from_relative(0.5, 640, centre=True), pixels_from_relative(0.5, 640, centre=False)
+    (319.5, 320.0)
+    """
+    return relative * size - (0.5 if centre else 0.0)
+
+
+def relative_sensor(relative: tuple[float, ...], size: tuple[int, int]) -> dict[str, float]:
+    """``fx, fy, cx, cy`` in pixels from four relative numbers."""
+    fx, fy, cx, cy = relative
+    width, height = size
+    return {
+        "fx": pixels_from_relative(fx, width, centre=False),
+        "fy": pixels_from_relative(fy, height, centre=False),
+        "cx": pixels_from_relative(cx, width, centre=True),
+        "cy": pixels_from_relative(cy, height, centre=True),
+    }

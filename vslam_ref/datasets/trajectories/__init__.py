@@ -1,0 +1,49 @@
+"""Trajectories in the formats of TUM, KITTI and EuRoC, read and written without losing a bit.
+
+=======  ==============================================================================================
+format   one line is
+=======  ==============================================================================================
+tum      ``time tx ty tz qx qy qz qw``: seconds, metres, unit quaternion with w **last**
+kitti    ``r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz``: the upper three rows of the matrix; no time
+euroc    ``time,tx,ty,tz,qw,qx,qy,qz``: **nanoseconds** (whole), metres, quaternion with w **first**;
+         nine more columns (velocity and biases) may follow and are not read
+=======  ==============================================================================================
+
+All three are read as ``T_world_body``.  ``#`` begins a comment, ``.gz`` is unpacked.
+
+*Nothing is lost.*  Numbers are written with the fewest digits that read back as the same double.  Two
+things of a file are no part of a :class:`~vslam_ref.metrics.trajectory.poses.Trajectory`: quaternions as
+they stand there (rounded, so not of unit length; the rotation matrices are those of the normalised
+quaternions), and whole nanoseconds (a double holds seconds since 1970 to 2.4e-7 s).  :class:`AsRead` keeps
+them, and :func:`write` gives them back.
+
+*Nothing wrong gets in.*  A quaternion whose length, or a matrix whose R^T R, is off by more than
+``UNIT_TOLERANCE`` is refused, and so is a time that goes back.  A time may stand twice in one line of a
+thousand (a recorder's hiccup: the true poses of the TUM set fr2/desk have one); such lines are counted, and
+more are refused.
+"""
+
+from vslam_ref.datasets.trajectories.formats import FORMATS, AsRead, TrajectoryFile
+from vslam_ref.datasets.trajectories.reading import (
+    UNIT_TOLERANCE,
+    detect,
+    read,
+    read_euroc,
+    read_kitti,
+    read_tum,
+)
+from vslam_ref.datasets.trajectories.writing import to_text, write
+
+__all__ = [
+    "FORMATS",
+    "UNIT_TOLERANCE",
+    "AsRead",
+    "TrajectoryFile",
+    "detect",
+    "read",
+    "read_euroc",
+    "read_kitti",
+    "read_tum",
+    "to_text",
+    "write",
+]

@@ -1,0 +1,9 @@
+"""Floor 2: estimation by least squares, from one robust loss to a whole map.
+
+============================  =====================================================================
+room                          holds
+============================  =====================================================================
+``robust``                    losses that wrong matches cannot bend, and the scale they need
+``least_squares``             Levenberg-Marquardt for small dense problems
+============================  =====================================================================
+"""

@@ -1,0 +1,44 @@
+"""Levenberg-Marquardt for small dense problems: minimise half the sum of squares of r(x), or of rho(r(x)).
+
+One iteration, in this order:
+
+1. residual r and Jacobian J at x; with a robust loss, rows multiplied by the root of their weight;
+2. scale D, the lengths of the columns of J; damping lambda;
+3. step: least squares of ``[J; sqrt(lambda) D] step = [-r; 0]`` by QR, never by ``J^T J``;
+4. gain: what the step really won, over what the linear model promised;
+5. gain > 0: go there and damp less; otherwise stay and damp more.
+
+==================  ==========================================================================
+module              holds
+==================  ==========================================================================
+``problem``         residuals and Jacobians, given or numeric; the robust loss; bad values
+``damping``         Nielsen's rule, Ceres' trust region, and none at all (Gauss-Newton)
+``linear``          the damped step by QR, and covariances
+``solver``          the loop, and the reasons to end it
+``result``          what comes back: solution, reason, history
+``regressions``     fifteen model functions of NIST's certified problems, with Jacobians
+==================  ==========================================================================
+"""
+
+from vslam_ref.estimation.least_squares.damping import Ceres, Damping, Nielsen, Undamped
+from vslam_ref.estimation.least_squares.linear import Covariance, covariance, damped_step
+from vslam_ref.estimation.least_squares.problem import Problem, numeric_jacobian
+from vslam_ref.estimation.least_squares.result import Iteration, Reason, Solution
+from vslam_ref.estimation.least_squares.solver import Options, minimise
+
+__all__ = [
+    "Ceres",
+    "Covariance",
+    "Damping",
+    "Iteration",
+    "Nielsen",
+    "Options",
+    "Problem",
+    "Reason",
+    "Solution",
+    "Undamped",
+    "covariance",
+    "damped_step",
+    "minimise",
+    "numeric_jacobian",
+]

@@ -1,0 +1,115 @@
+"""Pieces of the radial-tangential lens: its terms, its Jacobian in the plane, and the end of its field."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.geometry.cameras._roots import first_of, first_positive_root
+from vslam_ref.geometry.cameras.interface import MAX_TAN, Array
+
+
+class Radial(NamedTuple):
+    """Powers q, q^2, q^3 (..., 3), denominator M, factor G = N/M, and dG/dq."""
+
+    powers: Array
+    M: Array
+    G: Array
+    slope: Array
+
+
+def coefficients(k: ArrayLike) -> tuple[Array, Array, Array]:
+    """Of N (..., 3), of M (..., 0 or 3), and p = (p2, p1)."""
+    k = np.asarray(k, dtype=np.float64)
+    if k.ndim == 0 or k.shape[-1] not in (5, 8):
+        raise ValueError(f"k has shape {k.shape}; need (..., 5): k1 k2 p1 p2 k3, or (..., 8) with k4 k5 k6")
+    return k[..., [0, 1, 4]], k[..., 5:], k[..., [3, 2]]
+
+
+def radial(k: ArrayLike, q: Array) -> Radial:
+    """Everything radial at the squared radius q."""
+    numerator, denominator, _ = coefficients(k)
+    powers = np.stack([q, q * q, q**3], -1)
+    slopes = np.stack([np.ones_like(q), 2 * q, 3 * q * q], -1)
+    N, dN = 1.0 + (numerator * powers).sum(-1), (numerator * slopes).sum(-1)
+    if denominator.shape[-1] == 0:
+        return Radial(powers, np.ones_like(N), N, dN)
+    M, dM = 1.0 + (denominator * powers).sum(-1), (denominator * slopes).sum(-1)
+    M = np.where(M == 0.0, 1.0, M)  # only outside the field
+    return Radial(powers, M, N / M, (dN - N / M * dM) / M)
+
+
+def tangential(p: Array, xn: Array, q: Array) -> Array:
+    """The shift q p + 2 (p . xn) xn."""
+    moved: Array = q[..., None] * p + 2 * (p * xn).sum(-1, keepdims=True) * xn
+    return moved
+
+
+def plane_jacobian(radial: Radial, p: Array, xn: Array) -> Array:
+    """dxd/dxn, symmetric, shape (..., 2, 2): xd is the gradient of a potential."""
+    row, column = xn[..., None, :], xn[..., :, None]
+    p = np.broadcast_to(p, xn.shape)
+    lean = p[..., :, None] * row
+    isotropic = radial.G + 2 * (p * xn).sum(-1)
+    J: Array = isotropic[..., None, None] * np.eye(2) + 2 * radial.slope[..., None, None] * column * row
+    return J + 2 * (lean + np.swapaxes(lean, -1, -2))
+
+
+@lru_cache(maxsize=4096)
+def _radius_of(k: tuple[float, ...]) -> float:
+    if not np.isfinite(k).all():
+        return 0.0
+    numerator, denominator, p = coefficients(k)
+    N = np.zeros(7)
+    N[0], N[2::2] = 1.0, numerator  # in powers of r
+    M = np.zeros(7)
+    M[0] = 1.0
+    if len(denominator):
+        M[2::2] = denominator
+    N, M = np.trim_zeros(N, "b"), np.trim_zeros(M, "b")
+    r = np.array([0.0, 1.0])
+    bend = 6 * np.hypot(*p) * r
+    poly = np.polynomial.polynomial
+    # (r N/M)' M^2 = (r N)' M - r N M'
+    slope = poly.polysub(
+        poly.polymul(poly.polyder(poly.polymul(r, N)), M), poly.polymul(poly.polymul(r, N), poly.polyder(M))
+    )
+    roots = (
+        first_positive_root(M),
+        first_positive_root(poly.polysub(slope, poly.polymul(bend, poly.polymul(M, M)))),
+        first_positive_root(poly.polysub(N, poly.polymul(bend, M))),
+    )
+    return first_of(roots, MAX_TAN)
+
+
+def field_radius(k: ArrayLike) -> Array:
+    """Radius R of the invertible field in the plane z = 1; at most ``MAX_TAN``.
+
+    With D(r) = r G(r^2) and s = hypot(p1, p2), R is the first zero of D'(r) - 6 s r, D(r)/r - 6 s r or M.
+    The two differences bound the eigenvalues of the Jacobian from below.  Without tangential terms R is the
+    radius at which D stops growing; with them it is sharp where D' is the smaller, as in barrel distortion.
+
+    Parameters
+    ----------
+    k : array_like, shape (..., 5) or (..., 8)
+        Lens parameters.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Examples
+    --------
+    >>> float(field_radius([-0.3, 0.0, 0.0, 0.0, 0.0]))  # 1 - 0.9 r^2 = 0
+    1.0540925533894...
+    """
+    k = np.asarray(k, dtype=np.float64)
+    coefficients(k)
+    if k.ndim == 1:
+        return np.asarray(_radius_of(tuple(k.tolist())))
+    rows, which = np.unique(k.reshape(-1, k.shape[-1]), axis=0, return_inverse=True)
+    radii = np.array([_radius_of(tuple(row)) for row in rows.tolist()])
+    return radii[which].reshape(k.shape[:-1])

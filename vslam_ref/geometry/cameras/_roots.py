@@ -1,0 +1,99 @@
+"""Where a radial function stops growing, and its inverse up to there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+EPS = float(np.finfo(np.float64).eps)
+
+
+def first_positive_root(coefficients: ArrayLike) -> float:
+    """Smallest positive real root of c0 + c1 x + c2 x^2 + ..., or infinity.
+
+    A pair of roots within 1e-6 of the real axis counts as a double root: there the polynomial touches
+    zero as far as its rounded coefficients can tell.
+
+    Examples
+    --------
+    >>> round(first_positive_root([2.0, -3.0, 1.0]), 12), first_positive_root([1.0, 0.0, 1.0])
+    (1.0, inf)
+    """
+    c = np.trim_zeros(np.asarray(coefficients, dtype=np.float64), "b")
+    if len(c) < 2:
+        return np.inf
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        monic = c / c[-1]
+    while not np.isfinite(monic).all():  # a last coefficient that tiny moves no root below 1e6
+        c = c[:-1]
+        if len(c) < 2:
+            return np.inf
+        monic = c / c[-1]
+    roots = np.roots(c[::-1])
+    real = roots.real[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0)]
+    return _polished(c, float(real.min())) if len(real) else np.inf
+
+
+def _polished(c: Array, root: float) -> float:
+    """Two steps of Newton's method, kept only when they are as small as a correction must be."""
+    slope = c[1:] * np.arange(1, len(c))
+    for _ in range(2):
+        derivative = float(np.polyval(slope[::-1], root))
+        step = float(np.polyval(c[::-1], root)) / derivative if derivative else 0.0
+        if not abs(step) < 1e-6 * root:
+            break
+        root -= step
+    return root
+
+
+def first_of(roots: Sequence[float], cap: float) -> float:
+    """Smallest of some roots, and the cap."""
+    return float(min([*roots, cap]))
+
+
+def solve_increasing(function: Callable[[Array], tuple[Array, Array]], target: Array, upper: Array) -> Array:
+    """Solve f(x) = target on [0, upper] for an increasing f with f(0) = 0 <= target <= f(upper).
+
+    Newton's method inside a bracket: a step that would leave the bracket, or that follows one which did
+    not halve the residual, is replaced by the bracket's middle.  The bracket always holds the root and is
+    halved at least every other step, so the method cannot fail; near the root Newton's steps pass.
+
+    Parameters
+    ----------
+    function : callable
+        ``x -> (f, df/dx)`` on arrays.
+    target, upper : ndarray, same shape
+    """
+    x = np.minimum(target, upper)
+    low, high = np.zeros_like(target), _bracket(function, target, x, upper)
+    last = np.full_like(target, np.inf)
+    for _ in range(200):
+        value, slope = function(x)
+        residual = value - target
+        low, high = np.where(residual <= 0, x, low), np.where(residual >= 0, x, high)
+        step = residual / np.where(slope > 0, slope, 1.0)
+        ahead = x - step
+        inside = (slope > 0) & (ahead >= low) & (ahead <= high) & (np.abs(residual) <= 0.5 * last)
+        ahead = np.where(inside, ahead, 0.5 * (low + high))
+        last = np.abs(residual)
+        done = (np.abs(ahead - x) <= 2 * EPS * x) | (np.abs(residual) <= EPS * target)
+        x = np.where(done, x, ahead)
+        if done.all():
+            break
+    return x
+
+
+def _bracket(
+    function: Callable[[Array], tuple[Array, Array]], target: Array, start: Array, upper: Array
+) -> Array:
+    """Double ``start`` until f is beyond the target, but not beyond ``upper``, which may be very far."""
+    high = start
+    for _ in range(2000):
+        short = (function(high)[0] < target) & (high < upper)
+        if not short.any():
+            break
+        high = np.where(short, np.minimum(2 * high, upper), high)
+    return high

@@ -1,0 +1,106 @@
+"""A camera: intrinsics as a frozen dataclass, and what can be asked of it."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.geometry.cameras import projection
+from vslam_ref.geometry.cameras.interface import (
+    Array,
+    Lens,
+    Projection,
+    ProjectionJacobians,
+    RayJacobians,
+    Rays,
+    WorldProjectionJacobians,
+    as_points,
+)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What the models share; make one of them, such as :class:`~vslam_ref.geometry.cameras.fov.Fov`.
+
+    Parameters
+    ----------
+    fx, fy : float
+        Focal lengths, pixels, more than 0.
+    cx, cy : float
+        Principal point, pixels; (0, 0) is the centre of the top-left pixel.
+
+    Raises
+    ------
+    ValueError
+        On numbers that are not finite, or a focal length that is not positive.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    lens: ClassVar[Lens]
+
+    def __post_init__(self) -> None:
+        if not hasattr(self, "lens"):
+            raise TypeError("Camera has no lens; make a Pinhole, Fov, Radtan, Rational or Fisheye")
+        for name, value in zip(self.names(), astuple(self), strict=True):
+            if not np.isfinite(value):
+                raise ValueError(f"{name}={value}: must be finite")
+        if not (self.fx > 0 and self.fy > 0):
+            raise ValueError(f"fx={self.fx}, fy={self.fy}: focal lengths must be more than 0")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the intrinsics in the order of ``params``."""
+        return tuple(field.name for field in fields(cls))
+
+    @property
+    def params(self) -> Array:
+        """All intrinsics, shape (n,)."""
+        return np.array(astuple(self), dtype=np.float64)
+
+    @classmethod
+    def from_params(cls, params: ArrayLike) -> Self:
+        """Camera from a vector in the order of ``names()``."""
+        values = as_points(params, len(cls.names()), f"params of {cls.__name__}")
+        return cls(*values.tolist())
+
+    @property
+    def matrix(self) -> Array:
+        """K, shape (3, 3)."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def max_angle(self) -> float:
+        """Angle off the axis, radians, at which the invertible field ends."""
+        return self.lens.max_angle(self.params[4:])
+
+    def project(self, X_cam: ArrayLike) -> Projection:
+        """Pixels of points (..., 3) in the camera's frame; see :func:`.projection.project`."""
+        return projection.project(self.params, X_cam, lens=self.lens)
+
+    def project_with_jacobians(self, X_cam: ArrayLike) -> ProjectionJacobians:
+        """:meth:`project` with Jacobians in the point and in ``params``."""
+        return projection.project_with_jacobians(self.params, X_cam, lens=self.lens)
+
+    def unproject(self, uv: ArrayLike) -> Rays:
+        """Unit bearings of pixels (..., 2); see :func:`.projection.unproject`."""
+        return projection.unproject(self.params, uv, lens=self.lens)
+
+    def unproject_with_jacobians(self, uv: ArrayLike) -> RayJacobians:
+        """:meth:`unproject` with the Jacobian of the bearing in the pixel."""
+        return projection.unproject_with_jacobians(self.params, uv, lens=self.lens)
+
+    def pixel_from_world(self, T_cam_world: ArrayLike, X_world: ArrayLike) -> Projection:
+        """Pixels of world points; see :func:`.projection.pixel_from_world`."""
+        return projection.pixel_from_world(self.params, T_cam_world, X_world, lens=self.lens)
+
+    def pixel_from_world_with_jacobians(
+        self, T_cam_world: ArrayLike, X_world: ArrayLike
+    ) -> WorldProjectionJacobians:
+        """:meth:`pixel_from_world` with Jacobians in pose, point and intrinsics."""
+        return projection.pixel_from_world_with_jacobians(self.params, T_cam_world, X_world, lens=self.lens)
