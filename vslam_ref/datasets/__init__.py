@@ -1,6 +1,6 @@
 """Floor 5: foreign formats and image sources.  One convention inside, conversion at this door.
 
-``known`` is the table of data sets, ``catalogue`` finds them on disk.  ``text`` and ``matfile`` read numbers and
-say where a file is wrong; ``mrclam`` and ``victoria_park`` make logs of them; ``noise`` holds what was identified
-from those logs.
+``known`` is the table of data sets, ``catalogue`` finds them on disk.  ``text`` and ``matfile`` read
+numbers and say where a file is wrong; ``mrclam`` and ``victoria_park`` make logs of them; ``noise`` holds
+what was identified from those logs.
 """
