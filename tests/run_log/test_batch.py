@@ -136,6 +136,7 @@ def test_gains_and_offsets_are_found_without_truth(
     np.testing.assert_allclose(cov, batch.free_cov / 2, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_likeliest_noises_are_those_of_the_world(
     make_world: Callable[..., object], calibration: Calibration
 ) -> None:

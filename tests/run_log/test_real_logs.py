@@ -44,8 +44,8 @@ the last sighting, 0.17 m before, and a linear correction of a heading that is t
 """
 NEES_BOUND = 40.0
 """Mean NEES on robot 1 that the filters stay under and broken ones do not; 3 would be consistent."""
-QUICK = RunSettings(max_step=0.1)
-"""Sums of odometry over 0.1 s: a fifth of the time; the difference is asserted below."""
+QUICK = RunSettings(max_step=0.2, record_period=0.2)
+"""Sums of odometry over 0.2 s: a tenth of the steps; the difference is asserted below."""
 
 
 @cache
@@ -139,6 +139,7 @@ def test_a_broken_covariance_misses_the_consistency_of_the_ekf(broken: type[EkfS
         assert summary(run(1, name), truth)["nees_mean"] < NEES_BOUND
 
 
+@pytest.mark.slow
 @needs_mrclam
 def test_the_iekf_and_the_anchored_ekf_do_not_care_how_uncertain_the_start_is() -> None:
     """The mechanism of chapter 16 on a real log: P0, which no measurement can reduce, moves the EKF only.
@@ -165,9 +166,10 @@ def test_the_iekf_and_the_anchored_ekf_do_not_care_how_uncertain_the_start_is() 
     assert change["ekf"] > 0.1
 
 
+@pytest.mark.slow
 @needs_mrclam
 def test_summed_odometry_changes_no_result() -> None:
-    """The whole trajectory at odometry rate and in steps of 0.1 s."""
+    """The whole trajectory at odometry rate and in steps of 0.2 s."""
     log, truth = robot(3)
     fine = summary(run_log(log, noise.calibration("mrclam"), "ekf"), truth)
     coarse = summary(run(3, "ekf"), truth)
@@ -193,7 +195,9 @@ def test_the_batch_solution_is_the_bound(number: int) -> None:
 
 
 @needs_park
-@pytest.mark.parametrize("name", list(FILTERS))
+@pytest.mark.parametrize(
+    "name", ["ekf", *(pytest.param(n, marks=pytest.mark.slow) for n in FILTERS if n != "ekf")]
+)
 def test_victoria_park_stays_with_its_gps(name: str) -> None:
     """Metre level: 3.5 m over 4 km, GPS errors included; dead reckoning alone is tens of metres off."""
     folder = catalogue.require("victoria_park")

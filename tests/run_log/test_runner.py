@@ -50,11 +50,11 @@ def test_a_noise_free_log_gives_back_its_world(
 def test_the_filters_are_consistent_in_a_world_of_their_own_noises(
     make_world: Callable[..., object], calibration: Calibration
 ) -> None:
-    """Final pose NEES of 40 runs: chi-squared, 120 degrees of freedom in sum; 1 false alarm in 1000."""
+    """Final pose NEES of 20 runs: chi-squared, 60 degrees of freedom in sum; 1 false alarm in 1000."""
     stats = pytest.importorskip("scipy.stats")
     finals: dict[str, list[float]] = {name: [] for name in FILTERS}
-    for seed in range(40):
-        world = make_world(f"w{seed}", calibration, seed, seconds=25.0)
+    for seed in range(20):
+        world = make_world(f"w{seed}", calibration, seed, seconds=20.0)
         log = mrclam.read_log(world.folder, 1)
         truth = mrclam.read_truth(world.folder, 1, log)
         for name in FILTERS:
@@ -64,7 +64,7 @@ def test_the_filters_are_consistent_in_a_world_of_their_own_noises(
             # the first record has no covariance at all
             e, P = placed.errors[-1], placed.covs[-1]
             finals[name].append(float(e @ np.linalg.solve(P, e)))
-    low, high = stats.chi2.ppf([0.0005, 0.9995], 120) / 40
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 60) / 20
     for name, values in finals.items():
         assert low < np.mean(values) < high, name
 

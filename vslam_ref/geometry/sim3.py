@@ -29,7 +29,7 @@ from vslam_ref.geometry.nearest import nearest_rotation
 DOF = 7
 
 _HALVINGS = 4  # then |sigma + i theta| < 0.65 for |sigma| < 8 and theta < 2 pi
-_TERMS = 16  # the first one left out is below 0.65^17 / 18! < 1.1e-19
+_TERMS = 14  # the first one left out is below 0.65^15 / 16! < 1e-16
 
 
 def identity(shape: tuple[int, ...] = ()) -> Array:
