@@ -65,7 +65,7 @@ def test_wrong_points_do_not_move_the_place(answer: ModuleType, share: float, wh
     honest = points[int(share * 400) :].mean(axis=0)
     told = f"{share:.0%} of the points lie {where:g} away: the place is off by {found - honest}"
     if not np.abs(found - honest).max() < 0.1:
-        pytest.fail(told + "; did you start from the mean, where no honest point has any weight?")
+        pytest.fail(told + "; do scale or weights believe the wrong points, or is the loop over too soon?")
 
 
 def test_it_turns_with_the_axes(answer: ModuleType) -> None:

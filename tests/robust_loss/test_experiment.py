@@ -33,6 +33,8 @@ IDS = {
 
 def test_the_claims_hold_of_the_print(result: Result) -> None:
     assert verdicts(result.payload) == dict.fromkeys(IDS, "reproduced")
+    shares = {c.id: c.share for c in tukey_errata.claims(result)}
+    assert shares["drives-away-from-the-truth"] == shares["prefers-to-be-lost"] == 1.0
     assert load("tukey-errata").figure(result).axes
 
 

@@ -71,9 +71,12 @@ def test_the_committed_noises_are_likelier_than_their_neighbours() -> None:
     values = noise.calibration("mrclam")
 
     def likelihood(calibration: Calibration) -> float:
-        runs = [run_log(log, calibration, "ekf", identify.SETTINGS) for log in logs]
-        pairs = zip(runs, logs, strict=True)
-        return sum(identify.log_likelihood(run, identify.field_area(log)) for run, log in pairs)
+        runs = [
+            (run_log(log, calibration, name, identify.SETTINGS), log)
+            for name in identify.JUDGES
+            for log in logs
+        ]
+        return sum(identify.log_likelihood(run, identify.field_area(log)) for run, log in runs)
 
     best = likelihood(values)
     assert best == pytest.approx(noise.document("mrclam")["evidence"]["log_likelihood"], rel=1e-3)

@@ -143,7 +143,7 @@ def _far(study: Study) -> Claim:
         {name: float(s.mean()) for name, s in shares.items()},
         list(percentile_interval(draws)),
         None,
-        float(shares["printed"].mean()),
+        float(np.mean(shares["corrected"] * (1.0 - shares["printed"]))),
         verdict(bool(holds)),
     )
 

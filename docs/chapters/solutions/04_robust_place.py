@@ -1,7 +1,7 @@
 """Solution of exercise 4.1: a place that outliers cannot move.
 
-The start decides with a loss that ends: the mean of 100 points with one point at infinity is at
-infinity, and there no honest point has any weight.  The median of each coordinate stands firm.
+Start from the median of each coordinate: wrong points can shift it, but not carry it away.  The scale is
+taken again in every round, so a start that is off widens the cut until the honest points are inside.
 """
 
 import numpy as np

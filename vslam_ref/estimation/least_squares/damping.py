@@ -7,13 +7,13 @@ Nielsen's rule changes lambda smoothly, by :math:`\max(1/3,\, 1 - (2\,\text{gain
 and by 2, 4, 8… after failures in a row.  Ceres keeps a trust-region radius, 1/lambda, and changes it by the
 same function; what differs are the scale D and the start:
 
-===========  ======================================  =======================  ===========================
-rule         first lambda                            scale D                  bounds
-===========  ======================================  =======================  ===========================
-Nielsen      tau times the largest (J^T J)_ii / D²   largest columns so far  none
-Ceres        1e-4 (radius 1e4)                       columns, in 1e-3-1e16    radius in 1e-32-1e16
-Undamped     0                                       columns                  none: Gauss-Newton
-===========  ======================================  =======================  ===========================
+===========  ====================================  ========================  ======================
+rule         first lambda                          scale D                   bounds
+===========  ====================================  ========================  ======================
+Nielsen      tau, the largest column being 1         largest columns so far  none
+Ceres        1e-4 (radius 1e4)                     columns, in 1e-3-1e16     radius in 1e-32-1e16
+Undamped     0                                     columns                   none: Gauss-Newton
+===========  ====================================  ========================  ======================
 
 A column that vanishes at some x, as that of a rate does where its exponential has died away, takes its
 damping with it, and the next step along it is huge.  Moré's scale remembers how long the column was.
