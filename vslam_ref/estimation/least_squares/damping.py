@@ -10,7 +10,7 @@ same function; what differs are the scale D and the start:
 ===========  ====================================  ========================  ======================
 rule         first lambda                          scale D                   bounds
 ===========  ====================================  ========================  ======================
-Nielsen      tau, the largest column being 1         largest columns so far  none
+Nielsen      tau, the largest column being 1       largest columns so far    none
 Ceres        1e-4 (radius 1e4)                     columns, in 1e-3-1e16     radius in 1e-32-1e16
 Undamped     0                                     columns                   none: Gauss-Newton
 ===========  ====================================  ========================  ======================
