@@ -157,6 +157,8 @@ def test_ctrl_c_ends_with_status_130_one_line_and_no_half_result(tmp_path, jobs)
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # a background job of a shell starts with SIGINT ignored, and hands that down
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         env=environment(TOY_HANG=str(started)),
     )
     deadline = time.monotonic() + 60
