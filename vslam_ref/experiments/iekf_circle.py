@@ -134,15 +134,9 @@ def run(config: CircleStudyConfig, context: RunContext) -> Result:
         for name in FILTERS
         for first in range(0, config.population, config.batch)
     ]
-    parts: dict[str, list[Errors]] = {}
-    for task, done in zip(tasks, context.map(simulate, tasks, "circle"), strict=True):
-        parts.setdefault(f"{task.filter}/{task.start}", []).append(done)
-    errors = {key: neighbours.join(part) for key, part in parts.items()}
-    arrays = {
-        f"{name}/{key}": getattr(e, name).astype(np.float32)
-        for key, e in errors.items()
-        for name in ("heading", "position", "nees")
-    }
+    names = [f"{task.filter}/{task.start}" for task in tasks]
+    errors = neighbours.collect(names, context.map(simulate, tasks, "circle"))
+    arrays = neighbours.per_run_arrays(errors)
     time = _world(config.world).times
     series = neighbours.series_of(time, errors)
     return Result(series, config.seed, config.runs, arrays | {"time": time}, (config, errors))

@@ -10,7 +10,7 @@ EKF *is* the EKF: what either study shows there, P0 cannot explain.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -113,6 +113,23 @@ def _errors(error: Array, cov: Array, stretch: Array) -> Errors:
 def join(parts: list[Errors]) -> Errors:
     """Put batches of runs together."""
     return Errors(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def collect(names: Sequence[str], batches: Sequence[Errors]) -> dict[str, Errors]:
+    """Join the batches of equal name, ``filter/start``, in the order in which they come."""
+    parts: dict[str, list[Errors]] = {}
+    for name, batch in zip(names, batches, strict=True):
+        parts.setdefault(name, []).append(batch)
+    return {name: join(part) for name, part in parts.items()}
+
+
+def per_run_arrays(errors: Mapping[str, Errors]) -> dict[str, NDArray[np.float32]]:
+    """Return the per-run curves for ``runs.npz``, in single precision."""
+    return {
+        f"{kind}/{name}": getattr(e, kind).astype(np.float32)
+        for name, e in errors.items()
+        for kind in ("heading", "position", "nees")
+    }
 
 
 def rmse(error: Array) -> float:
