@@ -1,12 +1,13 @@
-"""The inverse of the radial-tangential lens, for flat batches of positions."""
+"""The inverse of the radial-tangential lens, for flat batches of positions (N, 2); k is (n,) or (N, n)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vslam_ref.geometry.cameras._batches import of
 from vslam_ref.geometry.cameras._radtan_terms import coefficients, plane_jacobian, radial, tangential
 from vslam_ref.geometry.cameras._roots import solve_increasing
-from vslam_ref.geometry.cameras.interface import Array, BoolArray
+from vslam_ref.geometry.cameras.interface import Array, BoolArray, IntArray
 
 ITERATIONS = 100
 ROUNDINGS = 32
@@ -24,13 +25,14 @@ def may_have_a_ray(k: Array, xd: Array, radius: Array) -> BoolArray:
 def radial_start(k: Array, target: Array, radius: Array) -> Array:
     """Position whose radial part alone has the target's radius; the field's edge where there is none."""
 
-    def grow(r: Array) -> tuple[Array, Array]:
-        terms = radial(k, r * r)
+    def grow(r: Array, at: IntArray) -> tuple[Array, Array]:
+        terms = radial(of(k, at), r * r)
         return r * terms.G, terms.G + 2 * r * r * terms.slope
 
     size = np.hypot(target[..., 0], target[..., 1])
     edge = radius * (1 - 1e-9)
-    r = solve_increasing(grow, np.minimum(size, grow(edge)[0]), edge)
+    farthest, _ = grow(edge, np.arange(len(edge)))
+    r = solve_increasing(grow, np.minimum(size, farthest), edge)
     ratio = np.divide(r, size, out=np.ones_like(size), where=size > 0)
     return target * ratio[..., None]
 
@@ -44,16 +46,16 @@ def newton(k: Array, target: Array, xn: Array, radius: Array) -> tuple[Array, Bo
     for _ in range(ITERATIONS):
         # go on to the last rounding, but give up soon where only roundings are left
         least = np.where(size <= ROUNDINGS * tolerance, 0.9, 1e-6)
-        at = np.nonzero((size > tolerance) & (damping > least))
-        if at[0].size == 0:
+        at = np.flatnonzero((size > tolerance) & (damping > least))
+        if len(at) == 0:
             break
-        ahead = xn[at] - damping[at][..., None] * _solve_2x2(J[at], error[at])
-        stays = np.hypot(ahead[..., 0], ahead[..., 1]) < radius[at]
-        ahead = np.where(stays[..., None], ahead, xn[at])
-        new_error, new_size, new_J = _image(k[at], ahead, target[at])
+        ahead = xn[at] - damping[at, None] * _solve_2x2(J[at], error[at])
+        stays = np.hypot(ahead[:, 0], ahead[:, 1]) < radius[at]
+        ahead = np.where(stays[:, None], ahead, xn[at])
+        new_error, new_size, new_J = _image(of(k, at), ahead, target[at])
         better = stays & (new_size < size[at])
         damping[at] = np.where(better, 1.0, damping[at] / 2)
-        at = tuple(index[better] for index in at)
+        at = at[better]
         xn[at], error[at], size[at], J[at] = ahead[better], new_error[better], new_size[better], new_J[better]
     inside = np.hypot(xn[..., 0], xn[..., 1]) < radius
     return xn, inside & (size <= ROUNDINGS * tolerance)

@@ -13,9 +13,8 @@ from vslam_ref.geometry.cameras.interface import MAX_TAN, Array
 
 
 class Radial(NamedTuple):
-    """Powers q, q^2, q^3 (..., 3), denominator M, factor G = N/M, and dG/dq."""
+    """Denominator M, factor G = N/M, and dG/dq."""
 
-    powers: Array
     M: Array
     G: Array
     slope: Array
@@ -32,14 +31,18 @@ def coefficients(k: ArrayLike) -> tuple[Array, Array, Array]:
 def radial(k: ArrayLike, q: Array) -> Radial:
     """Everything radial at the squared radius q."""
     numerator, denominator, _ = coefficients(k)
-    powers = np.stack([q, q * q, q**3], -1)
-    slopes = np.stack([np.ones_like(q), 2 * q, 3 * q * q], -1)
-    N, dN = 1.0 + (numerator * powers).sum(-1), (numerator * slopes).sum(-1)
+    N, dN = _cubic(numerator, q)
     if denominator.shape[-1] == 0:
-        return Radial(powers, np.ones_like(N), N, dN)
-    M, dM = 1.0 + (denominator * powers).sum(-1), (denominator * slopes).sum(-1)
+        return Radial(np.ones_like(N), N, dN)
+    M, dM = _cubic(denominator, q)
     M = np.where(M == 0.0, 1.0, M)  # only outside the field
-    return Radial(powers, M, N / M, (dN - N / M * dM) / M)
+    return Radial(M, N / M, (dN - N / M * dM) / M)
+
+
+def _cubic(c: Array, q: Array) -> tuple[Array, Array]:
+    """1 + c1 q + c2 q^2 + c3 q^3 and its derivative, by Horner's rule."""
+    c1, c2, c3 = c[..., 0], c[..., 1], c[..., 2]
+    return 1.0 + q * (c1 + q * (c2 + q * c3)), c1 + q * (2 * c2 + q * (3 * c3))
 
 
 def tangential(p: Array, xn: Array, q: Array) -> Array:
@@ -50,12 +53,14 @@ def tangential(p: Array, xn: Array, q: Array) -> Array:
 
 def plane_jacobian(radial: Radial, p: Array, xn: Array) -> Array:
     """dxd/dxn, symmetric, shape (..., 2, 2): xd is the gradient of a potential."""
-    row, column = xn[..., None, :], xn[..., :, None]
-    p = np.broadcast_to(p, xn.shape)
-    lean = p[..., :, None] * row
-    isotropic = radial.G + 2 * (p * xn).sum(-1)
-    J: Array = isotropic[..., None, None] * np.eye(2) + 2 * radial.slope[..., None, None] * column * row
-    return J + 2 * (lean + np.swapaxes(lean, -1, -2))
+    x, y = xn[..., 0], xn[..., 1]
+    px, py = p[..., 0], p[..., 1]
+    isotropic = radial.G + 2 * (px * x + py * y)
+    J = np.empty((*x.shape, 2, 2))
+    J[..., 0, 0] = isotropic + 2 * radial.slope * x * x + 4 * px * x
+    J[..., 1, 1] = isotropic + 2 * radial.slope * y * y + 4 * py * y
+    J[..., 0, 1] = J[..., 1, 0] = 2 * radial.slope * x * y + 2 * (px * y + py * x)
+    return J
 
 
 @lru_cache(maxsize=4096)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -54,46 +55,51 @@ def first_of(roots: Sequence[float], cap: float) -> float:
     return float(min([*roots, cap]))
 
 
-def solve_increasing(function: Callable[[Array], tuple[Array, Array]], target: Array, upper: Array) -> Array:
+Increasing = Callable[[Array, IntArray], tuple[Array, Array]]
+"""``(x, at) -> (f, df/dx)`` for the equations number ``at``."""
+
+
+def solve_increasing(function: Increasing, target: Array, upper: Array) -> Array:
     """Solve f(x) = target on [0, upper] for an increasing f with f(0) = 0 <= target <= f(upper).
 
     Newton's method inside a bracket: a step that would leave the bracket, or that follows one which did
     not halve the residual, is replaced by the bracket's middle.  The bracket always holds the root and is
     halved at least every other step, so the method cannot fail; near the root Newton's steps pass.
+    Equations that are solved are dropped, so a few slow ones do not cost the others' time.
 
     Parameters
     ----------
     function : callable
-        ``x -> (f, df/dx)`` on arrays.
-    target, upper : ndarray, same shape
+        ``(x, at) -> (f, df/dx)`` on arrays; ``at`` (M,) are the numbers of the equations that are asked.
+    target, upper : ndarray, shape (N,)
     """
-    x = np.minimum(target, upper)
-    low, high = np.zeros_like(target), _bracket(function, target, x, upper)
-    last = np.full_like(target, np.inf)
+    solution, at = np.minimum(target, upper), np.arange(len(target))
+    x, low = solution.copy(), np.zeros_like(target)
+    high, last = _bracket(function, target, x, upper), np.full_like(target, np.inf)
     for _ in range(200):
-        value, slope = function(x)
+        value, slope = function(x, at)
         residual = value - target
         low, high = np.where(residual <= 0, x, low), np.where(residual >= 0, x, high)
         step = residual / np.where(slope > 0, slope, 1.0)
         ahead = x - step
         inside = (slope > 0) & (ahead >= low) & (ahead <= high) & (np.abs(residual) <= 0.5 * last)
         ahead = np.where(inside, ahead, 0.5 * (low + high))
-        last = np.abs(residual)
         done = (np.abs(ahead - x) <= 2 * EPS * x) | (np.abs(residual) <= EPS * target)
-        x = np.where(done, x, ahead)
-        if done.all():
+        solution[at] = np.where(done, x, ahead)
+        left = ~done
+        if not left.any():
             break
-    return x
+        at, target, x, low, high = at[left], target[left], ahead[left], low[left], high[left]
+        last = np.abs(residual)[left]
+    return solution
 
 
-def _bracket(
-    function: Callable[[Array], tuple[Array, Array]], target: Array, start: Array, upper: Array
-) -> Array:
+def _bracket(function: Increasing, target: Array, start: Array, upper: Array) -> Array:
     """Double ``start`` until f is beyond the target, but not beyond ``upper``, which may be very far."""
-    high = start
+    high, at = start.copy(), np.arange(len(target))
     for _ in range(2000):
-        short = (function(high)[0] < target) & (high < upper)
-        if not short.any():
+        at = at[(function(high[at], at)[0] < target[at]) & (high[at] < upper[at])]
+        if len(at) == 0:
             break
-        high = np.where(short, np.minimum(2 * high, upper), high)
+        high[at] = np.minimum(2 * high[at], upper[at])
     return high

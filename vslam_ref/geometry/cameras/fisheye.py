@@ -18,6 +18,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.geometry.cameras._batches import flatten, of
 from vslam_ref.geometry.cameras._roots import first_of, first_positive_root, solve_increasing
 from vslam_ref.geometry.cameras._series import ARCTAN_SERIES, arctan_ratio
 from vslam_ref.geometry.cameras.camera import Camera
@@ -26,6 +27,7 @@ from vslam_ref.geometry.cameras.interface import (
     BoolArray,
     Distorted,
     DistortedJacobians,
+    IntArray,
     Lens,
     Rays,
     as_points,
@@ -191,22 +193,23 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     >>> undistort([0, 0, 0, 0], [np.pi / 2, 0.0]).bearing.round(12)
     array([1., 0., 0.])
     """
-    k, xd = _coefficients(k), as_points(xd, 2, "xd")
-    edge = np.broadcast_to(field_angle(k), np.broadcast_shapes(k.shape[:-1], xd.shape[:-1]))
+    batch = flatten(_coefficients(k), as_points(xd, 2, "xd"))
+    edge = np.broadcast_to(field_angle(k), batch.shape).ravel()
 
-    def grow(theta: Array) -> tuple[Array, Array]:
+    def grow(theta: Array, at: IntArray) -> tuple[Array, Array]:
         p = theta * theta
-        kappa, slope = _kappa(k, p)
+        kappa, slope = _kappa(of(batch.k, at), p)
         return theta * kappa, kappa + 2 * p * slope
 
-    size = np.hypot(xd[..., 0], xd[..., 1])
-    valid = size < grow(edge)[0]  # false for NaN
-    theta = solve_increasing(grow, np.where(valid, size, 0.0), edge.copy())
-    scale = np.sinc(theta / np.pi) / _kappa(k, theta * theta)[0]
-    bearing = np.empty((*valid.shape, 3))
-    bearing[..., :2] = np.where(valid[..., None], xd, 0.0) * scale[..., None]
-    bearing[..., 2] = np.cos(np.where(valid, theta, 0.0))
-    return Rays(bearing / np.linalg.norm(bearing, axis=-1, keepdims=True), valid)
+    size = np.hypot(batch.xd[:, 0], batch.xd[:, 1])
+    valid = size < grow(edge, np.arange(len(edge)))[0]  # false for NaN
+    theta = solve_increasing(grow, np.where(valid, size, 0.0), edge)
+    scale = np.sinc(theta / np.pi) / _kappa(batch.k, theta * theta)[0]
+    bearing = np.empty((len(edge), 3))
+    bearing[:, :2] = np.where(valid[:, None], batch.xd, 0.0) * scale[:, None]
+    bearing[:, 2] = np.cos(np.where(valid, theta, 0.0))
+    bearing /= np.linalg.norm(bearing, axis=-1, keepdims=True)
+    return Rays(bearing.reshape(*batch.shape, 3), valid.reshape(batch.shape))
 
 
 def max_angle(k: ArrayLike) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
 
 MAX_TAN = 1e6
 """Largest x/z and y/z of the models that go through the plane z = 1.

@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.geometry.cameras._batches import flatten, of
 from vslam_ref.geometry.cameras._radtan_inverse import may_have_a_ray, newton, radial_start
 from vslam_ref.geometry.cameras._radtan_terms import (
     coefficients,
@@ -91,12 +92,13 @@ def distort_with_jacobians(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians
     xd = xn * terms.G[..., None] + tangential(p, xn, q)
     J_k = np.zeros((*xd.shape, 5 + denominator.shape[-1]))
     over = xn[..., None] / terms.M[..., None, None]
-    J_k[..., [0, 1, 4]] = over * terms.powers[..., None, :]
+    powers = np.stack([q, q * q, q**3], -1)
+    J_k[..., [0, 1, 4]] = over * powers[..., None, :]
     J_k[..., 0, 2] = J_k[..., 1, 3] = 2 * xn[..., 0] * xn[..., 1]
     J_k[..., 1, 2] = q + 2 * xn[..., 1] ** 2
     J_k[..., 0, 3] = q + 2 * xn[..., 0] ** 2
     if denominator.shape[-1]:
-        J_k[..., 5:] = -over * (terms.G[..., None] * terms.powers)[..., None, :]
+        J_k[..., 5:] = -over * (terms.G[..., None] * powers)[..., None, :]
     inside = valid[..., None, None]
     J_X = plane_jacobian(terms, p, xn) @ seen.J_point
     return DistortedJacobians(xd, valid, np.where(inside, J_X, 0.0), np.where(inside, J_k, 0.0))
@@ -130,17 +132,14 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     Rays(bearing=array([[0.4472136 , 0.        , 0.89442719],
            [0.        , 0.        , 1.        ]]), valid=array([ True, False]))
     """
-    xd = as_points(xd, 2, "xd")
     radius = field_radius(k)
-    k = np.asarray(k, dtype=np.float64)
-    shape = np.broadcast_shapes(xd.shape[:-1], k.shape[:-1])
-    k = np.broadcast_to(k, (*shape, k.shape[-1])).reshape(-1, k.shape[-1])
-    xd = np.broadcast_to(xd, (*shape, 2)).reshape(-1, 2)
-    radius = np.broadcast_to(radius, shape).ravel()
-    at = np.flatnonzero(may_have_a_ray(k, xd, radius))
-    found, xn = np.zeros(len(xd), dtype=np.bool_), np.zeros(xd.shape)
-    xn[at], found[at] = newton(k[at], xd[at], radial_start(k[at], xd[at], radius[at]), radius[at])
-    return rays_through(xn.reshape(*shape, 2), found.reshape(shape))
+    batch = flatten(np.asarray(k, dtype=np.float64), as_points(xd, 2, "xd"))
+    radius = np.broadcast_to(radius, batch.shape).ravel()
+    at = np.flatnonzero(may_have_a_ray(batch.k, batch.xd, radius))
+    k, target, radius = of(batch.k, at), batch.xd[at], radius[at]
+    found, xn = np.zeros(len(batch.xd), dtype=np.bool_), np.zeros(batch.xd.shape)
+    xn[at], found[at] = newton(k, target, radial_start(k, target, radius), radius)
+    return rays_through(xn.reshape(*batch.shape, 2), found.reshape(batch.shape))
 
 
 def max_angle(k: ArrayLike) -> float:
