@@ -1,0 +1,51 @@
+"""Camera calibration from images of a flat board, for every camera model: what PTAM's calibrator does.
+
+==================  ==========================================================================
+module              holds
+==================  ==========================================================================
+``board``           the board, its corners in each view
+``homography``      board plane to image, by the normalised direct linear transform
+``zhang``           sensor from homographies, pose from a homography
+``parameters``      which intrinsics are free
+``start``           where to begin, for lenses with and without much distortion
+``problem``         the residual and its Jacobians
+``arrow``           the normal equations, poses eliminated
+``solver``          Levenberg-Marquardt over poses and intrinsics
+``result``          what comes back; covariance; what the corners do not determine
+``ptam``            the step of PTAM's calibrator, as it was
+``simulated``       boards in front of a known camera
+==================  ==========================================================================
+"""
+
+from vslam_ref.estimation.calibration import ptam, simulated
+from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
+from vslam_ref.estimation.calibration.homography import apply_homography, homography
+from vslam_ref.estimation.calibration.parameters import Free
+from vslam_ref.estimation.calibration.problem import Problem, State
+from vslam_ref.estimation.calibration.result import Calibration, tilt
+from vslam_ref.estimation.calibration.solver import calibrate
+from vslam_ref.estimation.calibration.start import Start, find_start, poses_for
+from vslam_ref.estimation.calibration.zhang import Sensor, pose_from_homography, sensor_from_homographies
+
+__all__ = [
+    "Board",
+    "Calibration",
+    "Corners",
+    "Free",
+    "Problem",
+    "Sensor",
+    "Start",
+    "State",
+    "View",
+    "apply_homography",
+    "calibrate",
+    "find_start",
+    "homography",
+    "pose_from_homography",
+    "poses_for",
+    "ptam",
+    "sensor_from_homographies",
+    "simulated",
+    "stack",
+    "tilt",
+]
