@@ -1,5 +1,43 @@
-"""Bundle adjustment (work in progress)."""
+"""Bundle adjustment: poses, points and intrinsics from everything that was seen, at once.
+
+The smallest sum of reprojection errors is found by Levenberg-Marquardt.  A point meets only the views that see it, so the
+points are eliminated first (Schur complement), and a system of the views remains.
+
+====================  ============================================================================
+module                holds
+====================  ============================================================================
+``problem``           scene, observations, covariances, what may move
+``projection``        residuals and Jacobians of all observations
+``structure``         orders and columns: which view meets which at a point
+``normal``            the blocks of the normal equations
+``schur``             points eliminated, and back again
+``reduced_system``    the system of the views: dense or banded Cholesky
+``weights``           robust loss, fixed or adaptive scale
+``solver``            the loop, and the reasons to end it
+``result``            what comes back
+``book``              the same algorithm in plain loops, to be read, and to be compared with
+``diagnosis``         what is wrong with a problem before anything is solved
+``local``             the newest views and their neighbours only
+``outliers``          wrong observations found and taken out
+``gauge``             the seven coordinates that no image shows
+``covariance``        of chosen poses and points
+====================  ============================================================================
+"""
 
 from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Observations, Scene, freedom
+from vslam_ref.estimation.bundle.result import BundleResult, Iteration
+from vslam_ref.estimation.bundle.solver import Options, bundle_adjust
+from vslam_ref.estimation.bundle.weights import Robust
 
-__all__ = ["BundleProblem", "Freedom", "Observations", "Scene", "freedom"]
+__all__ = [
+    "BundleProblem",
+    "BundleResult",
+    "Freedom",
+    "Iteration",
+    "Observations",
+    "Options",
+    "Robust",
+    "Scene",
+    "bundle_adjust",
+    "freedom",
+]

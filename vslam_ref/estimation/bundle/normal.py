@@ -1,0 +1,143 @@
+"""The normal equations, in blocks: what all observations say about a step of all views and points.
+
+With weighted rows r, J_view, J_point of each observation, summed over the observations of a view or a point::
+
+    B  = sum J_view^T J_view     g_view  = sum J_view^T r       per view   (V, d, d), (V, d)
+    C  = sum J_point^T J_point   g_point = sum J_point^T r      per point  (N, 3, 3), (N, 3)
+    W  = J_view^T J_point                                       per observation (n, d, 3)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.estimation.bundle.problem import Array, IntArray
+from vslam_ref.estimation.bundle.projection import Linearised, Links, State, linearise, polynomial_params
+from vslam_ref.estimation.bundle.structure import Structure
+from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
+
+
+class Normal(NamedTuple):
+    """Blocks of the normal equations; see the module."""
+
+    B: Array
+    g_view: Array
+    C: Array
+    g_point: Array
+    W: Array
+
+
+def normal_equations(
+    model: type[Camera], state: State, table: Structure, weights: Array, basis: Array
+) -> Normal:
+    """Linearise at a state and add up.
+
+    Implements :eq:`eq-ba-blocks`.
+
+    Parameters
+    ----------
+    model : type of Camera
+    state : State
+    table : Structure
+    weights : ndarray, shape (n,)
+        Of each observation, from the robust loss; 0 leaves it out.
+    basis : ndarray, shape (p, q)
+        Free directions of the intrinsics.
+    """
+    links, root = table.links, np.sqrt(weights)
+    U = table.whitener * root[:, None, None]
+    orders = (table.offsets, table.view_order, table.view_offsets)
+    if model in (Pinhole, Radtan):
+        padded = np.zeros((9, basis.shape[1]))
+        padded[: len(basis)] = basis
+        params = polynomial_params(state.intrinsics)
+        moving = (state.R_cam_world, state.t_cam_world, state.X_world, params)
+        return Normal(*polynomial_normal(*moving, *links, U, padded, *orders))
+    return Normal(*_blocks(linearise(model, state, links, basis), U, links, *orders))
+
+
+@accelerated("bundle:polynomial_normal")
+def polynomial_normal(
+    R_cam_world: Array,
+    t_cam_world: Array,
+    X_world: Array,
+    params: Array,
+    view: IntArray,
+    point: IntArray,
+    lens: IntArray,
+    uv: Array,
+    U: Array,
+    basis: Array,
+    offsets: IntArray,
+    view_order: IntArray,
+    view_offsets: IntArray,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Blocks (B, g_view, C, g_point, W) for pinhole and radial-tangential lenses.
+
+    Parameters
+    ----------
+    R_cam_world, t_cam_world, X_world : ndarray, shapes (V, 3, 3), (V, 3), (N, 3)
+    params : ndarray, shape (L, 9)
+        fx, fy, cx, cy, k1, k2, p1, p2, k3.
+    view, point, lens : ndarray of int, shape (n,)
+        Sorted by point.
+    uv : ndarray, shape (n, 2)
+        Pixels.
+    U : ndarray, shape (n, 2, 2)
+        What rows are multiplied by: whitening times the root of the weight.
+    basis : ndarray, shape (9, q)
+        Free directions of the intrinsics.
+    offsets, view_order, view_offsets : ndarray of int
+        As in :class:`~vslam_ref.estimation.bundle.structure.Structure`.
+    """
+    links = Links(view, point, lens, uv)
+    state = State(R_cam_world, t_cam_world, X_world, params)
+    return _blocks(linearise(Radtan, state, links, basis), U, links, offsets, view_order, view_offsets)
+
+
+def _blocks(
+    at: Linearised, U: Array, links: Links, offsets: IntArray, view_order: IntArray, view_offsets: IntArray
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Add up weighted rows."""
+    r, J_view, J_point = _weighted(at, U)
+    views, d = len(view_offsets) - 1, J_view.shape[2]
+    W = np.matmul(np.swapaxes(J_view, 1, 2), J_point)
+    rows, errors = J_view[view_order], r[view_order]
+    B, g_view = np.empty((views, d, d)), np.empty((views, d))
+    for i in range(views):  # one product a view is far quicker than a product an observation
+        part = slice(view_offsets[i], view_offsets[i + 1])
+        J = rows[part].reshape(-1, d)
+        B[i], g_view[i] = J.T @ J, J.T @ errors[part].ravel()
+    upper = [(a, b) for a in range(3) for b in range(a, 3)]
+    products = np.empty((len(r), 9))
+    for column, (a, b) in enumerate(upper):
+        products[:, column] = J_point[:, 0, a] * J_point[:, 0, b] + J_point[:, 1, a] * J_point[:, 1, b]
+    products[:, 6:] = J_point[:, 0] * r[:, :1] + J_point[:, 1] * r[:, 1:]
+    sums = _sum_by_point(products, offsets)
+    C = np.empty((len(sums), 3, 3))
+    for column, (a, b) in enumerate(upper):
+        C[:, a, b] = C[:, b, a] = sums[:, column]
+    return B, g_view, C, sums[:, 6:], W
+
+
+def _weighted(at: Linearised, U: Array) -> tuple[Array, Array, Array]:
+    """Rows multiplied by U, (2, 2) each; a multiple of the identity is quicker."""
+    root = U[:, 0, 0]
+    if U.strides[0] == 0 or not (U[:, 0, 1].any() or U[:, 1, 0].any() or (root != U[:, 1, 1]).any()):
+        if (root == 1.0).all():
+            return at.r, at.J_view, at.J_point
+        scale = root[:, None, None]
+        return at.r * root[:, None], at.J_view * scale, at.J_point * scale
+    return np.einsum("nab,nb->na", U, at.r), U @ at.J_view, U @ at.J_point
+
+
+def _sum_by_point(rows: Array, offsets: IntArray) -> Array:
+    """Sum rows (n, m) of each point, (N, m): a product with a matrix of zeros and ones."""
+    from scipy.sparse import csr_array
+
+    n, points = len(rows), len(offsets) - 1
+    selection = csr_array((np.ones(n), np.arange(n), offsets), shape=(points, n))
+    return np.asarray(selection @ rows)

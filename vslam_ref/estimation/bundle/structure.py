@@ -1,0 +1,246 @@
+"""Where everything stands in the linear system: orders, columns, chunks; computed once a problem.
+
+The system of one step has an arrow's shape.  With the views first and the points last::
+
+          views     points
+        [   B    |    W    ]      B  block diagonal, one block a view (and a border for shared lenses)
+        [--------+---------]      C  block diagonal, 3 x 3 a point
+        [  W^T   |    C    ]      W  a block for every observation
+
+*Columns.*  View i owns up to 6 + q columns of the reduced system: its pose and, unless other views share its
+lens, the q free directions of its intrinsics.  Shared lenses have their columns behind all views.  Fixed
+coordinates have none: they get the number ``size``, a column that is computed and thrown away.
+
+*Orders.*  Views are renumbered by reverse Cuthill-McKee on "see a point in common", which gathers the reduced
+system near its diagonal.  Points are ordered by their first view, so that a chunk of them touches few
+columns.  Observations are sorted by point, then shared lens, then view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray
+from vslam_ref.estimation.bundle.projection import Links, State
+
+CHUNK_ENTRIES = 100_000
+"""Rows times columns that the dense window of a chunk should not exceed: it then stays in the cache."""
+CHUNK_POINTS = (100, 400)
+"""But a chunk has at least so many points, that adding its result costs less than its product; and at most."""
+
+
+class Windows(NamedTuple):
+    """Chunks of points, each with the columns of the reduced system that it touches.
+
+    Attributes
+    ----------
+    points : ndarray, shape (m + 1,)
+        Chunk c holds the points ``points[c]`` to ``points[c + 1]``.
+    offsets : ndarray, shape (m + 1,)
+        Its columns are ``columns[offsets[c]:offsets[c + 1]]``, rising; the last one is the waste column.
+    columns : ndarray
+    local : ndarray, shape (n, d)
+        Position within its chunk's columns of each column of an observation.
+    """
+
+    points: IntArray
+    offsets: IntArray
+    columns: IntArray
+    local: IntArray
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Orders and index tables of one problem.
+
+    Attributes
+    ----------
+    order : ndarray, shape (n,)
+        Number in the problem of each sorted observation.
+    point_order : ndarray, shape (N,)
+        Number in the problem of each sorted point.
+    links : Links
+        Of the sorted observations; point numbers are those of the sorted points.
+    whitener : ndarray, shape (n, 2, 2)
+        U with U^T U the inverse covariance; the identity where none was given.
+    has_cov : bool
+    offsets : ndarray, shape (N + 1,)
+        Observations of sorted point j are ``offsets[j]`` to ``offsets[j + 1]``.
+    runs : ndarray
+        First observation of each run with the same point and the same columns of the lens.
+    view_order, view_offsets : ndarray, shapes (n,) and (V + 1,)
+        Sorted observations gathered by view.
+    columns : ndarray, shape (V, d)
+    size : int
+        Columns of the reduced system.
+    border : int
+        First column of the shared lenses; ``size`` where there are none.
+    bandwidth : int
+        Largest distance of two columns before the border that share a point.
+    free_point : ndarray, shape (N,)
+        Of the sorted points.
+    windows : Windows
+    """
+
+    order: IntArray
+    point_order: IntArray
+    links: Links
+    whitener: Array
+    has_cov: bool
+    offsets: IntArray
+    runs: IntArray
+    view_order: IntArray
+    view_offsets: IntArray
+    columns: IntArray
+    size: int
+    border: int
+    bandwidth: int
+    free_point: BoolArray
+    windows: Windows
+
+    def state(self, problem: BundleProblem) -> State:
+        """Start of the problem, its points sorted."""
+        T = problem.scene.T_cam_world
+        X = problem.scene.X_world[self.point_order]
+        R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
+        return State(R, t, X, problem.scene.intrinsics)
+
+
+def structure(problem: BundleProblem) -> Structure:
+    """Sort a problem and number its columns."""
+    views, points, _ = problem.sizes
+    seen = problem.seen
+    rank = _view_ranks(problem)
+    columns, border, size = _columns(problem, rank)
+    first = np.full(points, views, dtype=np.int64)
+    np.minimum.at(first, seen.point, rank[seen.view])
+    point_order = np.argsort(first, kind="stable")
+    sorted_point = np.empty(points, dtype=np.int64)
+    sorted_point[point_order] = np.arange(points)
+    lens = problem.lens_of_view[seen.view]
+    by_lens = lens if border < size else np.zeros_like(lens)
+    order = np.lexsort((rank[seen.view], by_lens, sorted_point[seen.point]))
+    links = Links(seen.view[order], sorted_point[seen.point[order]], lens[order], seen.uv[order])
+    counts = np.bincount(links.point, minlength=points)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    view_order = np.argsort(links.view, kind="stable")
+    view_offsets = np.concatenate([[0], np.cumsum(np.bincount(links.view, minlength=views))])
+    return Structure(
+        order=order,
+        point_order=point_order,
+        links=links,
+        whitener=_whitener(problem)[order],
+        has_cov=seen.cov_uv is not None,
+        offsets=offsets,
+        runs=_runs(links, columns, border, size),
+        view_order=view_order,
+        view_offsets=view_offsets,
+        columns=columns,
+        size=size,
+        border=border,
+        bandwidth=_bandwidth(links, columns, border, offsets),
+        free_point=problem.free.point[point_order],
+        windows=_windows(links, columns, size, offsets),
+    )
+
+
+def _view_ranks(problem: BundleProblem) -> IntArray:
+    """Rank of each view in the order of elimination: reverse Cuthill-McKee on the covisibility graph."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    views, points, n = problem.sizes
+    seen = problem.seen
+    sees = csr_array((np.ones(n, dtype=np.int32), (seen.view, seen.point)), shape=(views, points))
+    order = reverse_cuthill_mckee((sees @ sees.T).tocsr(), symmetric_mode=True)
+    rank = np.empty(views, dtype=np.int64)
+    rank[order] = np.arange(views)
+    return rank
+
+
+def _columns(problem: BundleProblem, rank: IntArray) -> tuple[IntArray, int, int]:
+    """Columns (V, 6 + q) of each view's coordinates, first column of the border, number of columns."""
+    views, _, _ = problem.sizes
+    q = problem.free.intrinsics.shape[1]
+    sets = len(problem.scene.intrinsics)
+    shared = bool(np.bincount(problem.lens_of_view, minlength=sets).max(initial=0) > 1)
+    free = np.ones((views, 6 + q), dtype=np.bool_)
+    free[:, :6] = problem.free.pose
+    free[:, 6:] = not shared
+    by_rank = np.argsort(rank)
+    numbers = np.cumsum(free[by_rank].ravel()).reshape(views, 6 + q) - 1
+    columns = np.empty((views, 6 + q), dtype=np.int64)
+    columns[by_rank] = numbers
+    border = int(free.sum())
+    size = border
+    if shared:
+        used = np.unique(problem.lens_of_view)
+        place = np.zeros(sets, dtype=np.int64)
+        place[used] = np.arange(len(used))
+        columns[:, 6:] = border + q * place[problem.lens_of_view][:, None] + np.arange(q)
+        free[:, 6:] = True
+        size += q * len(used)
+    columns[~free] = size
+    return columns, border, size
+
+
+def _whitener(problem: BundleProblem) -> Array:
+    """U (n, 2, 2) with U^T U = cov^-1: the inverse of the lower Cholesky factor."""
+    cov = problem.seen.cov_uv
+    if cov is None:
+        return np.broadcast_to(np.eye(2), (len(problem.seen), 2, 2))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(cov)))
+
+
+def _runs(links: Links, columns: IntArray, border: int, size: int) -> IntArray:
+    """Starts of runs of observations that share point and border columns; every one without a border."""
+    n = len(links.view)
+    if border == size or n == 0:
+        return np.arange(n)
+    new = (np.diff(links.point) != 0) | (np.diff(links.lens) != 0)
+    return np.concatenate([[0], np.flatnonzero(new) + 1])
+
+
+def _bandwidth(links: Links, columns: IntArray, border: int, offsets: IntArray) -> int:
+    """Largest distance of two columns before the border that meet at a point or in a view."""
+    inside = columns < border
+    low = np.where(inside, columns, border).min(1, initial=border)
+    high = np.where(inside, columns, -1).max(1, initial=-1)
+    widest = int((high - low).max(initial=0))
+    starts = offsets[:-1][np.diff(offsets) > 0]
+    if len(starts) and border:
+        first = np.minimum.reduceat(low[links.view], starts)
+        last = np.maximum.reduceat(high[links.view], starts)
+        widest = max(widest, int((last - first).max()))
+    return max(widest, 0)
+
+
+def _windows(links: Links, columns: IntArray, size: int, offsets: IntArray) -> Windows:
+    """Cut the points into chunks whose dense window stays small."""
+    points = len(offsets) - 1
+    local = np.empty((len(links.view), columns.shape[1]), dtype=np.int64)
+    bounds, ends, parts = [0], [0], []
+    while bounds[-1] < points:
+        begin = bounds[-1]
+        end = min(points, begin + CHUNK_POINTS[1])
+        used = _touched(links, columns, size, offsets[begin], offsets[end])
+        fitting = max(CHUNK_POINTS[0], CHUNK_ENTRIES // (3 * len(used)))
+        if end - begin > fitting:
+            end = begin + fitting
+            used = _touched(links, columns, size, offsets[begin], offsets[end])
+        part = slice(offsets[begin], offsets[end])
+        local[part] = np.searchsorted(used, columns[links.view[part]])
+        parts.append(used)
+        bounds.append(end)
+        ends.append(ends[-1] + len(used))
+    joined = np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
+    return Windows(np.array(bounds), np.array(ends), joined.astype(np.int64), local)
+
+
+def _touched(links: Links, columns: IntArray, size: int, begin: int, end: int) -> IntArray:
+    """Columns of a range of observations, rising, the waste column last."""
+    views = np.unique(links.view[begin:end])
+    return np.unique(np.append(columns[views].ravel(), size))
