@@ -93,7 +93,7 @@ class Experiment(Generic[C]):
     Parameters
     ----------
     id : str
-        Lower-case words joined by ``-``; the module has the same name with ``_``.
+        Lower-case words joined by ``-``, or ``.`` in a number; the module has the same name with ``_``.
     title, source : str
         What it shows; the paper and the place in it.
     config_type : type
@@ -124,8 +124,8 @@ class Experiment(Generic[C]):
     with_runs: Callable[[C, int], C] = scale_runs
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.id):
-            raise ValueError(f"experiment id {self.id!r}: use lower-case words joined by '-'")
+        if not re.fullmatch(r"[a-z0-9]+([-.][a-z0-9]+)*", self.id):
+            raise ValueError(f"experiment id {self.id!r}: use lower-case words joined by '-' or '.'")
         if not dataclasses.is_dataclass(self.config_type):
             raise ValueError(f"experiment {self.id!r}: config_type must be a dataclass")
         if not self.config_type.__dataclass_params__.frozen:  # type: ignore[attr-defined]

@@ -67,9 +67,18 @@ def load(id: str) -> Experiment[Any]:
         raise InputError(
             f"unknown experiment {id!r}{suggestion(id, known)}; known: {', '.join(known) or 'none'}"
         )
-    module = importlib.import_module(f"{PACKAGE}.{id.replace('-', '_')}")
+    module = importlib.import_module(f"{PACKAGE}.{module_name(id)}")
     experiment: Experiment[Any] = module.EXPERIMENT
     return experiment
+
+
+def module_name(id: str) -> str:
+    """Name of the module of an experiment.
+
+    >>> module_name("multiview-fig1.1")
+    'multiview_fig1_1'
+    """
+    return id.replace("-", "_").replace(".", "_")
 
 
 @cache
@@ -102,6 +111,6 @@ def _summary(path: Path, call: ast.expr | None) -> Summary:
     missing = [name for name in Summary._fields if not isinstance(given.get(name), str)]
     if missing:
         raise ValueError(f"{path}: EXPERIMENT must give {', '.join(missing)} as literal keyword strings")
-    if str(given["id"]).replace("-", "_") != path.stem:
+    if module_name(str(given["id"])) != path.stem:
         raise ValueError(f"{path}: EXPERIMENT has id {given['id']!r}, which belongs in another file")
     return Summary(*(str(given[name]) for name in Summary._fields))

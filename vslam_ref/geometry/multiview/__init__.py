@@ -1,0 +1,59 @@
+"""Several views of one scene: from poses to points, and from points to poses.
+
+=======================  ==========================================================================
+module                   holds
+=======================  ==========================================================================
+``views``                cameras and poses as arrays over views; rays and pixels of all of them
+``epipolar``             what a point in one image says about the other
+``midpoint``             where two rays pass closest, with exact Jacobians
+``triangulation``        points from any number of views: linear, then optimal, with covariance
+``two_view_optimum``     the global optimum for two views, from a polynomial of degree six
+``three_points``         every camera that sees three points where they were seen (P3P)
+``resection``            a camera from six points and more, or four of a plane, by linear equations
+=======================  ==========================================================================
+
+Point sets are aligned by :mod:`vslam_ref.geometry.alignment`.  A pose is refined by
+:mod:`vslam_ref.estimation.resection`, one floor up, where Levenberg-Marquardt and the robust losses live.
+"""
+
+from vslam_ref.geometry.alignment import Alignment, align
+from vslam_ref.geometry.multiview.epipolar import (
+    epipolar_distance,
+    essential_from_motion,
+    fundamental_from_essential,
+    relative_motion,
+    sampson_distance,
+)
+from vslam_ref.geometry.multiview.midpoint import midpoint, midpoint_with_jacobians
+from vslam_ref.geometry.multiview.point_state import PointState
+from vslam_ref.geometry.multiview.resection import LinearPose, PoseState, dlt, planar_dlt, resect_linear
+from vslam_ref.geometry.multiview.three_points import ThreePointPoses, p3p
+from vslam_ref.geometry.multiview.triangulation import Triangulation, triangulate, triangulate_linear
+from vslam_ref.geometry.multiview.two_view_optimum import CorrectedPair, correct_pair
+from vslam_ref.geometry.multiview.views import Views
+
+__all__ = [
+    "Alignment",
+    "CorrectedPair",
+    "LinearPose",
+    "PointState",
+    "PoseState",
+    "ThreePointPoses",
+    "Triangulation",
+    "Views",
+    "align",
+    "correct_pair",
+    "dlt",
+    "epipolar_distance",
+    "essential_from_motion",
+    "fundamental_from_essential",
+    "midpoint",
+    "midpoint_with_jacobians",
+    "p3p",
+    "planar_dlt",
+    "relative_motion",
+    "resect_linear",
+    "sampson_distance",
+    "triangulate",
+    "triangulate_linear",
+]

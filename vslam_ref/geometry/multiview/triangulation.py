@@ -1,0 +1,267 @@
+r"""Points from two views or more: linear first, then with the smallest reprojection error.
+
+**Linear.**  Camera i sees X along the unit bearing b.  Both are parallel, so the part of
+:math:`X_{cam} = R_i X + t_i` across b vanishes.  With :math:`N_b` (2, 3), two unit vectors across b,
+
+.. math:: N_{b_i} \,[R_i \; t_i] \begin{bmatrix} X \\ 1 \end{bmatrix} = 0 ,
+
+two rows a view for four homogeneous numbers.  Bearings, not pixels: any lens will do.
+
+**Optimal.**  The linear rows measure distances from rays; the noise is in pixels.  From the linear point
+Levenberg-Marquardt goes to the minimum of
+
+.. math:: c(X) = \tfrac12 \sum_i \lVert h(C_i, X) - u_i \rVert^2 / \sigma_i^2 ,
+
+and the inverse of its Gauss-Newton Hessian :math:`H = \sum_i J_i^T J_i / \sigma_i^2` is the covariance of X.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref.geometry import camera_pose, se3
+from vslam_ref.geometry._arrays import Array, as_array, times
+from vslam_ref.geometry.multiview._descent import descend
+from vslam_ref.geometry.multiview._rays import across, largest_angle
+from vslam_ref.geometry.multiview.point_state import BoolArray, PointState, StateArray
+from vslam_ref.geometry.multiview.views import Views
+
+MIN_PARALLAX = float(np.radians(1.0))
+"""Parallax, radians, below which a point is flagged: its depth is then known to some 60 pixel-angles.
+
+At a parallax alpha a bearing error e moves the depth Z by about Z e / alpha.
+"""
+
+RANK = 1e-12
+"""Share of the largest singular value below which the two smallest ones both count as zero."""
+
+FAR = 1e-12
+"""Homogeneous coordinate, of a unit vector, below which a point lies at infinity."""
+
+
+class LinearPoints(NamedTuple):
+    """Points (N, 3), their states (N,) and the largest angle (N,) between two rays of each, radians."""
+
+    X_world: Array
+    state: StateArray
+    parallax: Array
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """Optimal points.
+
+    Attributes
+    ----------
+    X_world : ndarray, shape (N, 3)
+        Always finite.  The linear point where ``state`` forbids a refinement, and the origin where there
+        is no point at all (``TOO_FEW``, ``NO_RAY``, ``NO_DEPTH``).
+    state : ndarray, shape (N,)
+        :class:`~vslam_ref.geometry.multiview.point_state.PointState` of each point.
+    parallax : ndarray, shape (N,)
+        Largest angle between two of its rays, radians.
+    cov_X : ndarray, shape (N, 3, 3)
+        Covariance to first order; infinite on the diagonal where there is none.
+    rmse_px : ndarray, shape (N,)
+        Root of the mean squared distance in the images, pixels; infinite where the point was not refined.
+    iterations : ndarray, shape (N,)
+        Steps tried.
+    """
+
+    X_world: Array
+    state: StateArray
+    parallax: Array
+    cov_X: Array
+    rmse_px: Array
+    iterations: NDArray[np.int64]
+
+    @property
+    def ok(self) -> BoolArray:
+        """Which points may be used, (N,)."""
+        return np.asarray(self.state == PointState.OK)
+
+    def counts(self) -> dict[str, int]:
+        """How many points are in which state."""
+        return {s.name: int(np.count_nonzero(self.state == s)) for s in PointState if (self.state == s).any()}
+
+
+def triangulate_linear(
+    T_cam_world: ArrayLike,
+    bearings: ArrayLike,
+    mask: ArrayLike | None = None,
+    *,
+    min_parallax: float = MIN_PARALLAX,
+) -> LinearPoints:
+    """Points from rays, by the smallest singular vector of two rows a view.
+
+    Implements :eq:`eq-triangulation-linear`.
+
+    Parameters
+    ----------
+    T_cam_world : array_like, shape (V, 4, 4)
+        Poses of the views.
+    bearings : array_like, shape (N, V, 3)
+        Unit vectors in the frames of the cameras, from any lens.
+    mask : array_like of bool, shape (N, V), optional
+        Which views see which point; all by default.  What is masked out may be NaN.
+    min_parallax : float
+        Flag points whose rays differ by less, radians.
+
+    Returns
+    -------
+    LinearPoints
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, or a bearing that counts is not a finite unit vector.
+
+    Notes
+    -----
+    The world is first moved and scaled so that the camera centres lie around the origin at distance 1;
+    the answer then does not depend on the world's frame or unit.
+
+    Examples
+    --------
+    >>> T = [se3.identity(), se3.exp([-1.0, 0, 0, 0, 0, 0])]
+    >>> rays = np.array([[[0.0, 0.0, 5.0], [-1.0, 0.0, 5.0]]])
+    >>> found = triangulate_linear(T, rays / np.linalg.norm(rays, axis=-1, keepdims=True))
+    >>> found.X_world.round(12).tolist(), found.state.tolist()
+    ([[0.0, 0.0, 5.0]], [0])
+    """
+    T = as_array("T_cam_world", T_cam_world, 4, 4)
+    b, used = _checked(T, bearings, mask)
+    middle, size = _frame(T)
+    R, p = se3.rotation(T), (camera_pose.centre_from_pose(T) - middle) / size
+    near = np.concatenate([R, -times(R, p)[..., None]], -1)  # [R | t] in the moved and scaled world
+    rows = (across(b) @ near) * used[..., None, None]  # (N, V, 2, 4)
+    _, s, Vt = np.linalg.svd(rows.reshape(len(b), -1, 4), full_matrices=True)
+    s = np.pad(s, ((0, 0), (0, 4 - s.shape[1])))  # a single view has two singular values only
+    h = Vt[:, 3]
+    flat = (s[:, 2] <= RANK * s[:, 0]) | (np.abs(h[:, 3]) <= FAR)
+    X = size * h[:, :3] / np.where(flat, 1.0, h[:, 3])[:, None] + middle
+    parallax = largest_angle(np.einsum("vji,nvj->nvi", R, b), used)
+    few = used.sum(axis=1) < 2
+    X = np.where((flat | few)[:, None], 0.0, X)
+    depth = np.einsum("nvi,nvi->nv", b, se3.act(T, X[:, None]))
+    behind = (used & (depth <= 0.0)).any(axis=1)
+    state = np.full(len(b), PointState.OK, dtype=np.int8)
+    state[parallax < min_parallax] = PointState.SMALL_PARALLAX
+    state[behind] = PointState.BEHIND
+    state[flat] = PointState.NO_DEPTH
+    state[few] = PointState.TOO_FEW
+    return LinearPoints(X, state, parallax)
+
+
+def triangulate(
+    views: Views,
+    uv: ArrayLike,
+    mask: ArrayLike | None = None,
+    *,
+    sigma_px: ArrayLike = 1.0,
+    min_parallax: float = MIN_PARALLAX,
+    max_iterations: int = 50,
+) -> Triangulation:
+    """Points with the smallest reprojection error, and their covariance.
+
+    Implements :eq:`eq-triangulation-optimal` and :eq:`eq-triangulation-covariance`.
+
+    Parameters
+    ----------
+    views : Views
+        Cameras and poses.
+    uv : array_like, shape (N, V, 2)
+        Measured pixels.
+    mask : array_like of bool, shape (N, V), optional
+        Which of them count; all by default.
+    sigma_px : array_like, broadcast to (N, V)
+        Standard deviation of one coordinate of a pixel.
+    min_parallax : float
+        Flag points whose rays differ by less, radians.
+    max_iterations : int
+        Steps tried at most.
+
+    Returns
+    -------
+    Triangulation
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a pixel that counts is not finite, or a ``sigma_px`` is not positive.
+
+    Notes
+    -----
+    A step ends the search when it is shorter than 1e-8 standard deviations of the point itself.  Rays
+    with a small angle are refined too, and flagged.
+
+    Examples
+    --------
+    >>> from vslam_ref.geometry.cameras import Pinhole
+    >>> views = Views(Pinhole(500, 500, 320, 240), [se3.identity(), se3.exp([-1.0, 0, 0, 0, 0, 0])])
+    >>> found = triangulate(views, [[[320.0, 240.5], [220.0, 239.5]]], sigma_px=0.5)
+    >>> found.X_world.round(9) + 0.0, found.rmse_px.round(9).tolist(), found.counts()
+    (array([[0., 0., 5.]]), [0.5], {'OK': 1})
+    >>> np.sqrt(np.diag(found.cov_X[0])).round(4).tolist()  # depth: Z^2/(f B) sqrt(2) sigma
+    [0.005, 0.0035, 0.0354]
+    """
+    pixels = views._pixels(uv)
+    used = _mask(mask, pixels.shape[:2])
+    _refuse(used & ~np.isfinite(pixels).all(axis=-1), pixels, "pixel", "must be finite, or masked out")
+    sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), used.shape)
+    if not (np.isfinite(sigma) & (sigma > 0)).all():
+        raise ValueError("sigma_px must be finite and more than 0")
+    pixels = np.where(used[..., None], pixels, 0.0)
+    rays = views.rays(pixels)
+    start = triangulate_linear(views.T_cam_world, rays.bearing, used, min_parallax=min_parallax)
+    state = start.state.copy()
+    X = start.X_world.copy()
+    blind = (used & ~rays.valid).any(axis=1) & (state != PointState.TOO_FEW)
+    state[blind] = PointState.NO_RAY
+    X[blind] = 0.0
+    go = np.flatnonzero((state == PointState.OK) | (state == PointState.SMALL_PARALLAX))
+    end = descend(views, pixels[go], np.where(used, 1.0 / sigma, 0.0)[go], X[go], max_iterations)
+    X[go] = end.X_world
+    state[go[~end.converged & (state[go] == PointState.OK)]] = PointState.NOT_CONVERGED
+    cov, rmse = np.tile(np.diag([np.inf] * 3), (len(X), 1, 1)), np.full(len(X), np.inf)
+    cov[go], rmse[go] = end.cov_X, end.rmse_px
+    iterations = np.zeros(len(X), dtype=np.int64)
+    iterations[go] = end.iterations
+    return Triangulation(X, state, start.parallax, cov, rmse, iterations)
+
+
+def _frame(T: Array) -> tuple[Array, float]:
+    """Middle of the camera centres, and their spread; 1 if they are all at one place."""
+    centres = camera_pose.centre_from_pose(T)
+    middle = centres.mean(axis=0)
+    size = float(np.sqrt(np.mean(np.sum((centres - middle) ** 2, axis=1))))
+    rounding = 8 * np.finfo(np.float64).eps * float(np.abs(centres).max(initial=0.0))
+    return middle, size if size > rounding else 1.0
+
+
+def _mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> BoolArray:
+    used = np.ones(shape, dtype=bool) if mask is None else np.asarray(mask)
+    if used.shape != shape or used.dtype != bool:
+        raise ValueError(f"mask is {used.dtype} of shape {used.shape}: need bool of {shape}")
+    return used
+
+
+def _checked(T: Array, bearings: ArrayLike, mask: ArrayLike | None) -> tuple[Array, BoolArray]:
+    """Bearings, the optical axis where masked out, and the mask."""
+    b = as_array("bearings", bearings, 3)
+    if T.ndim != 3 or b.ndim != 3 or b.shape[1] != len(T):
+        raise ValueError(f"T_cam_world {T.shape} and bearings {b.shape}: need (V, 4, 4) and (N, V, 3)")
+    used = _mask(mask, b.shape[:2])
+    length = np.linalg.norm(np.where(used[..., None], b, np.array([0.0, 0.0, 1.0])), axis=-1)
+    _refuse(~(np.abs(length - 1.0) < 1e-6), b, "bearing", "must be a unit vector, or masked out")
+    return np.where(used[..., None], b, np.array([0.0, 0.0, 1.0])), used
+
+
+def _refuse(bad: BoolArray, values: Array, what: str, right: str) -> None:
+    if bad.any():
+        n, v = np.argwhere(bad)[0]
+        raise ValueError(f"{what} of point {n} in view {v} is {values[n, v].tolist()}: {right}")
