@@ -11,6 +11,7 @@ module              holds
 ``problem``         the residual and its Jacobians
 ``arrow``           the normal equations, poses eliminated
 ``solver``          Levenberg-Marquardt over poses and intrinsics
+``robustly``        the same with a robust loss, for corners some of which are wrong
 ``result``          what comes back; covariance; what the corners do not determine
 ``ptam``            the step of PTAM's calibrator, as it was
 ``simulated``       boards in front of a known camera
@@ -23,6 +24,7 @@ from vslam_ref.estimation.calibration.homography import apply_homography, homogr
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import Problem, State
 from vslam_ref.estimation.calibration.result import Calibration, tilt
+from vslam_ref.estimation.calibration.robustly import RobustCalibration, calibrate_robustly
 from vslam_ref.estimation.calibration.solver import calibrate
 from vslam_ref.estimation.calibration.start import Start, find_start, poses_for
 from vslam_ref.estimation.calibration.zhang import Sensor, pose_from_homography, sensor_from_homographies
@@ -33,12 +35,14 @@ __all__ = [
     "Corners",
     "Free",
     "Problem",
+    "RobustCalibration",
     "Sensor",
     "Start",
     "State",
     "View",
     "apply_homography",
     "calibrate",
+    "calibrate_robustly",
     "find_start",
     "homography",
     "pose_from_homography",

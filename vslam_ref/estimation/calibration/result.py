@@ -14,6 +14,7 @@ from vslam_ref.estimation.calibration.problem import Point
 from vslam_ref.estimation.calibration.start import Start
 from vslam_ref.estimation.least_squares import Iteration
 from vslam_ref.estimation.least_squares.result import CONVERGED, Reason
+from vslam_ref.estimation.robust import norm_scale
 from vslam_ref.geometry.cameras import Camera
 
 LEAST_EIGENVALUE = 1e-12
@@ -145,12 +146,15 @@ def certainty(point: Point, free: Free) -> Certainty:
     Notes
     -----
     To first order in the noise.  The noise is taken from the residuals: what the model cannot explain counts
-    as noise, so with a lens model that does not fit, the deviations are too small.
+    as noise, so with a lens model that does not fit, the deviations are too small.  With a robust loss the
+    noise is that of the median, and the corners count by their weights.
     """
     views = len(point.state.T_cam_board)
     spare = 2 * len(point.residual) - 6 * views - len(free.names)
-    squares = float((point.weights[:, None] * point.residual**2).sum())
-    sigma = float(np.sqrt(squares / spare)) if spare > 0 else float("inf")
+    if (point.weights == 1.0).all():
+        sigma = float(np.sqrt((point.residual**2).sum() / spare)) if spare > 0 else float("inf")
+    else:
+        sigma = norm_scale(point.residual, parameters=6 * views + len(free.names)).sigma
     reduced = reduce(point.normal)
     if reduced is None:
         return Certainty(sigma, None, "a pose: the corners of one view do not determine it")

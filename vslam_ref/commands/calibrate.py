@@ -1,0 +1,217 @@
+"""``vslam-ref calibrate``: a camera from images of a checkerboard."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vslam_ref.commands.options import add_json, json_target, write_json
+
+if TYPE_CHECKING:
+    from vslam_ref.datasets.checkerboard import Array
+    from vslam_ref.estimation.calibration import Board, Calibration
+
+HELP = "calibrate a camera from images of a checkerboard"
+EPILOG = """\
+The board is told by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners; images in
+which the whole board is not seen are named and left out. Take 10 or more images, with the board tilted by 30
+to 60 degrees in different directions, near and far, and into all corners of the image.
+
+models:
+  radtan    fx fy cx cy k1 k2 p1 p2 k3: radial and tangential (OpenCV, Kalibr, EuRoC); the default
+  fov       fx fy cx cy omega: one angle (PTAM, TUM-mono)
+  fisheye   fx fy cx cy k1 k2 k3 k4: equidistant, for lenses of more than about 120 degrees
+  pinhole   fx fy cx cy: no distortion
+  rational  as radtan, with k4 k5 k6: needs many images
+
+Nothing is written, and the status is 2, where the images do not determine the camera.
+
+examples:
+  vslam-ref calibrate left*.jpg --board 9x6 --model radtan --out camera.yaml
+  vslam-ref calibrate images/ --board 9x6 --model fov --square 0.025 --json calibration.json
+  vslam-ref calibrate images/ --board 9x6 --fix k3=0 --aspect 1 --loss tukey"""
+
+LOSSES = ("l2", "huber", "tukey")
+MODELS = ("radtan", "fov", "fisheye", "pinhole", "rational")
+
+
+class Found(NamedTuple):
+    """Images with a board, their corners, those without, and the size they all have."""
+
+    used: list[Path]
+    corners: list[Array]
+    skipped: list[Path]
+    size: tuple[int, int]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this command."""
+    parser.add_argument("images", metavar="IMAGES", nargs="+", help="image files, or folders of images")
+    parser.add_argument("--board", metavar="CxR", required=True, help="inner corners of the board, as 9x6")
+    parser.add_argument("--model", choices=MODELS, default="radtan", help="lens model (default: radtan)")
+    parser.add_argument(
+        "--square",
+        metavar="SIZE",
+        type=float,
+        default=1.0,
+        help="side of a square, the unit of poses (default: 1)",
+    )
+    parser.add_argument(
+        "--fix",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="keep a parameter, as k3=0",
+    )
+    parser.add_argument("--aspect", metavar="RATIO", type=float, help="keep fy = RATIO fx")
+    parser.add_argument(
+        "--loss", choices=LOSSES, default="l2", help="robust loss, against wrong corners (default: l2, none)"
+    )
+    parser.add_argument("--out", metavar="FILE", help="write the camera to FILE, as OpenCV's YAML")
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Find the corners, calibrate, print the numbers and write what was asked for."""
+    from vslam_ref.datasets.checkerboard import image_files
+    from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly
+    from vslam_ref.experiments.framework import files
+
+    target = json_target(options)
+    out = files.require_parent(options.out) if options.out is not None else None
+    board = Board.from_text(options.board, options.square)
+    fixed = _fixed(options.fix)
+    began = time.perf_counter()
+    found = _find(image_files(options.images), board)
+    views = [(board.points, uv) for uv in found.corners]
+    more: dict[str, Any] = {"fixed": fixed, "aspect": options.aspect}
+    if options.loss == "l2":
+        result = calibrate(views, found.size, options.model, **more)
+    else:
+        result = calibrate_robustly(views, found.size, options.model, options.loss, **more).calibration
+    seconds = time.perf_counter() - began
+    _refuse(result)
+    numbers = _numbers(options.model, found, result, seconds)
+    _show(numbers, found, result)
+    if out is not None:
+        _write(out, result, found.size)
+    write_json(target, numbers)
+    return 0
+
+
+def _fixed(words: list[str]) -> dict[str, float]:
+    """Read ``NAME=VALUE``."""
+    fixed: dict[str, float] = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        try:
+            fixed[name.strip()] = float(value)
+        except ValueError:
+            raise ValueError(f"--fix {word!r}: expected NAME=VALUE, as k3=0") from None
+    return fixed
+
+
+def _find(paths: list[Path], board: Board) -> Found:
+    """Look for the board in all images."""
+    from tqdm import tqdm
+
+    from vslam_ref.datasets.checkerboard import find_corners, read_grey
+    from vslam_ref.datasets.text import FormatError
+
+    used: list[Path] = []
+    skipped: list[Path] = []
+    corners: list[Array] = []
+    size: tuple[int, int] | None = None
+    for path in tqdm(paths, desc="corners", unit="image", leave=False, disable=None):
+        image = read_grey(path)
+        this = (image.shape[1], image.shape[0])
+        if size is not None and this != size:
+            right = f"the images before have {size[0]}x{size[1]}"
+            raise FormatError(path, None, f"{this[0]}x{this[1]} pixels; {right}, and one camera has one size")
+        size = this
+        uv = find_corners(image, board.columns, board.rows)
+        if uv is None:
+            skipped.append(path)
+        else:
+            used.append(path)
+            corners.append(uv)
+    if not used or size is None:
+        what = f"no board of {board.columns}x{board.rows} inner corners in {len(paths)} image(s)"
+        raise ValueError(f"{what}, {_some(paths)}; --board counts inner corners, not squares")
+    return Found(used, corners, skipped, size)
+
+
+def _some(paths: list[Path]) -> str:
+    shown = ", ".join(path.name for path in paths[:3])
+    return shown if len(paths) <= 3 else f"{shown}, …"
+
+
+def _refuse(result: Calibration) -> None:
+    """Say in one line why there is no camera."""
+    if not result.converged:
+        raise ValueError(
+            f"not converged after {result.iterations} iterations ({result.reason}): {result.message}"
+        )
+    if result.undetermined:
+        raise ValueError(f"the images do not determine {result.undetermined}")
+
+
+def _numbers(model: str, found: Found, result: Calibration, seconds: float) -> dict[str, Any]:
+    camera = result.camera
+    return {
+        "model": model,
+        "image_size": list(found.size),
+        "images": len(found.used) + len(found.skipped),
+        "used": len(found.used),
+        "skipped": [str(path) for path in found.skipped],
+        "rms_px": result.rms_px,
+        "mean_px": result.mean_px,
+        "camera_matrix": camera.matrix.tolist(),
+        "distortion": camera.params[4:].tolist(),
+        "parameters": dict(zip(camera.names(), camera.params.tolist(), strict=True)),
+        "std": result.std,
+        "per_image": [
+            {"file": str(path), "rms_px": rms}
+            for path, rms in zip(found.used, result.view_rms_px.tolist(), strict=True)
+        ],
+        "iterations": result.iterations,
+        "reason": result.reason,
+        "seconds": seconds,
+    }
+
+
+def _show(numbers: dict[str, Any], found: Found, result: Calibration) -> None:
+    from vslam_ref.commands.tables import table
+
+    rows = [[str(one["file"]), f"{one['rms_px']:.4f}"] for one in numbers["per_image"]]
+    print(table(["image", "rms [px]"], rows))
+    for path in found.skipped:
+        print(f"{path}: no board found, left out")
+    print()
+    values, std = numbers["parameters"], numbers["std"]
+    unit = dict.fromkeys(("fx", "fy", "cx", "cy"), "px") | {"omega": "rad"}
+    print(
+        table(
+            [numbers["model"], "value", "std", "unit"],
+            [
+                [n, f"{values[n]:.6f}", f"{std[n]:.6f}" if std[n] else "fixed", unit.get(n, "")]
+                for n in values
+            ],
+        )
+    )
+    print()
+    print(f"rms {numbers['rms_px']:.5f} px, mean {numbers['mean_px']:.5f} px", end=" ")
+    print(f"over {len(result.residual)} corners of {numbers['used']} images;", end=" ")
+    print(f"{numbers['iterations']} iterations ({numbers['reason']}), {numbers['seconds']:.1f} s")
+    ignored = int((result.weights == 0.0).sum())
+    if ignored:
+        print(f"{ignored} corners are so far off that they weigh nothing")
+
+
+def _write(path: Path, result: Calibration, size: tuple[int, int]) -> None:
+    from vslam_ref.datasets.calibration_files import CameraFile, write_opencv
+
+    write_opencv(path, CameraFile(result.camera, size))
+    print(f"camera written to {path}")
