@@ -1,7 +1,7 @@
 """Bundle adjustment: poses, points and intrinsics from everything that was seen, at once.
 
-The smallest sum of reprojection errors is found by Levenberg-Marquardt.  A point meets only the views that see it, so the
-points are eliminated first (Schur complement), and a system of the views remains.
+The smallest sum of reprojection errors is found by Levenberg-Marquardt.  A point meets only the views that
+see it, so the points are eliminated first (Schur complement), and a system of the views remains.
 
 ====================  ============================================================================
 module                holds

@@ -10,10 +10,10 @@ The pinhole and the radial-tangential lens are written out here in columns, one 
 a problem of a hundred thousand observations spends its time on.  All other lenses go through
 :mod:`vslam_ref.geometry.cameras.projection`.  Both forms agree with it to rounding.
 
-**Behind a camera there is no image.**  Such an observation is not ``valid``: its residual is zero and so are its
-Jacobians; what it costs is the loss's business.  The polynomial is used beyond the field in which it
-can be inverted, as it is by every bundle adjuster: it is smooth there, and a lens that is being
-estimated may need to pass through such values.
+**Behind a camera there is no image.**  Such an observation is not ``valid``: its residual is zero and so are
+its Jacobians; what it costs is the loss's business.  The polynomial is used beyond the field in which it can
+be inverted, as it is by every bundle adjuster: it is smooth there, and a lens that is being estimated may
+need to pass through such values.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, IntArray
+from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan, pose_jacobian
 from vslam_ref.geometry.cameras import projection as cameras
 from vslam_ref.geometry.cameras.interface import MIN_DEPTH
@@ -89,6 +89,14 @@ def residuals(model: type[Camera], state: State, links: Links) -> Residuals:
         return Residuals(*polynomial_residuals(*moving, *links))
     at = cameras.project(state.intrinsics[links.lens], _points_in_cameras(state, links), lens=model.lens)
     return Residuals(np.where(at.valid[:, None], at.uv - links.uv, 0.0), at.valid)
+
+
+def reprojection(problem: BundleProblem) -> Residuals:
+    """Residuals of a problem's scene, in the problem's order."""
+    seen, T = problem.seen, problem.scene.T_cam_world
+    state = State(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics)
+    links = Links(seen.view, seen.point, problem.lens_of_view[seen.view], seen.uv)
+    return residuals(problem.model, state, links)
 
 
 @accelerated("bundle:polynomial_residuals")

@@ -1,7 +1,7 @@
 r"""Solving for the views: dense, or by a band where views only meet their neighbours.
 
-The band is that of all columns before the border, S = [[A, F], [F^T, G]] with A banded and F, G those of shared
-lenses.  With Y = A^-1 F, what is left for the border is G - F^T Y: a Schur complement once more.
+The band is that of all columns before the border, S = [[A, F], [F^T, G]] with A banded and F, G those of
+shared lenses.  With Y = A^-1 F, what is left for the border is G - F^T Y: a Schur complement once more.
 """
 
 from __future__ import annotations

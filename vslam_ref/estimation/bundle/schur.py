@@ -8,11 +8,16 @@ A step solves, with damping in B and C,
     \begin{bmatrix} \delta_{\mathrm{view}} \\ \delta_{\mathrm{point}} \end{bmatrix} =
     -\begin{bmatrix} g_{\mathrm{view}} \\ g_{\mathrm{point}} \end{bmatrix} .
 
-The lower row gives :math:`\delta_{\mathrm{point}} = -C^{-1}(g_{\mathrm{point}} + W^T \delta_{\mathrm{view}})`; put into the upper
-row it leaves :math:`S\,\delta_{\mathrm{view}} = -g_{\mathrm{view}} + W C^{-1} g_{\mathrm{point}}` with :math:`S = B - W C^{-1} W^T`.
+The lower row gives the points, once the views are known; put into the upper row it leaves
 
-C is block diagonal, so :math:`C^{-1} = M M^T` with M of 3 x 3 blocks, and S = B - V V^T with V = W M.  This is symmetric
-by construction, and half the work.
+.. math::
+
+    \delta_{\mathrm{point}} = -C^{-1}(g_{\mathrm{point}} + W^T \delta_{\mathrm{view}}) , \qquad
+    S\,\delta_{\mathrm{view}} = -g_{\mathrm{view}} + W C^{-1} g_{\mathrm{point}} , \qquad
+    S = B - W C^{-1} W^T .
+
+C is block diagonal, so :math:`C^{-1} = M M^T` with M of 3 x 3 blocks, and S = B - V V^T with V = W M.  This
+is symmetric by construction, and half the work.
 """
 
 from __future__ import annotations
@@ -46,8 +51,14 @@ class Diagonals(NamedTuple):
 def diagonals(normal: Normal, table: Structure) -> Diagonals:
     """Squared lengths of the columns of the Jacobian."""
     own = np.einsum("vii->vi", normal.B)
-    view = np.bincount(table.columns.ravel(), own.ravel(), minlength=table.size + 1)[: table.size]
+    view = add_at_columns(table.columns, own, table.size)
     return Diagonals(view, np.einsum("nii->ni", normal.C))
+
+
+def add_at_columns(columns: IntArray, values: Array, size: int) -> Array:
+    """Add up values (V, d) that belong to the same column of the reduced system, (size,)."""
+    total: Array = np.bincount(columns.ravel(), values.ravel(), minlength=size + 1)[:size].astype(np.float64)
+    return total
 
 
 def point_factor(C: Array, extra: Array, free: BoolArray) -> Array:
@@ -166,7 +177,7 @@ def _view_part(B: Array, g_view: Array, columns: IntArray, size: int) -> tuple[A
     S = np.zeros((size + 1, size + 1))
     for block, at in zip(B, columns, strict=True):
         S[at[:, None], at] += block
-    return S, -np.bincount(columns.ravel(), g_view.ravel(), minlength=size + 1)
+    return S, -np.append(add_at_columns(columns, g_view, size), 0.0)
 
 
 def _subtract(S: Array, used: IntArray, product: Array) -> None:
@@ -181,7 +192,8 @@ def _subtract(S: Array, used: IntArray, product: Array) -> None:
 
 def _points(offsets: IntArray) -> IntArray:
     """Point of each observation, from offsets."""
-    return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    points: IntArray = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    return points
 
 
 @accelerated("bundle:point_steps")
@@ -197,4 +209,5 @@ def point_steps(
     pulled = np.matmul(view_steps[view][:, None, :], W)[:, 0]
     n, points = len(W), len(offsets) - 1
     total = csr_array((np.ones(n), np.arange(n), offsets), shape=(points, n)) @ pulled + g_point
-    return -np.matmul(M, np.matmul(total[:, None, :], M)[:, 0][..., None])[..., 0]
+    steps: Array = -np.matmul(M, np.matmul(total[:, None, :], M)[:, 0][..., None])[..., 0]
+    return steps

@@ -23,13 +23,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray
+from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray, Observations
 from vslam_ref.estimation.bundle.projection import Links, State
+from vslam_ref.estimation.bundle.weights import whitener
 
 CHUNK_ENTRIES = 100_000
 """Rows times columns that the dense window of a chunk should not exceed: it then stays in the cache."""
 CHUNK_POINTS = (100, 400)
-"""But a chunk has at least so many points, that adding its result costs less than its product; and at most."""
+"""Fewest points of a chunk, so that adding its result costs less than its product; and most."""
 
 
 class Windows(NamedTuple):
@@ -132,7 +133,7 @@ def structure(problem: BundleProblem) -> Structure:
         order=order,
         point_order=point_order,
         links=links,
-        whitener=_whitener(problem)[order],
+        whitener=_whitener(problem.seen)[order],
         has_cov=seen.cov_uv is not None,
         offsets=offsets,
         runs=_runs(links, columns, border, size),
@@ -187,12 +188,11 @@ def _columns(problem: BundleProblem, rank: IntArray) -> tuple[IntArray, int, int
     return columns, border, size
 
 
-def _whitener(problem: BundleProblem) -> Array:
-    """U (n, 2, 2) with U^T U = cov^-1: the inverse of the lower Cholesky factor."""
-    cov = problem.seen.cov_uv
-    if cov is None:
-        return np.broadcast_to(np.eye(2), (len(problem.seen), 2, 2))
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(cov)))
+def _whitener(seen: Observations) -> Array:
+    """Whitening matrices (n, 2, 2), or a broadcast identity."""
+    if seen.cov_uv is None:
+        return np.broadcast_to(np.eye(2), (len(seen), 2, 2))
+    return whitener(seen.cov_uv)
 
 
 def _runs(links: Links, columns: IntArray, border: int, size: int) -> IntArray:

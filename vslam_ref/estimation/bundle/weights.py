@@ -1,17 +1,18 @@
 r"""How much each observation counts: a robust loss on the length of its whitened error.
 
-The error of an observation is :math:`\lVert e \rVert_\Sigma = (e^T \Sigma^{-1} e)^{1/2}`, a length in standard deviations, or in pixels
-where no covariance was given.  The objective is the sum of :math:`\rho(\lVert e \rVert_\Sigma)`.
+The error of an observation is :math:`\lVert e \rVert_\Sigma = (e^T \Sigma^{-1} e)^{1/2}`, a length in
+standard deviations, or in pixels where no covariance was given.  The objective is the sum of
+:math:`\rho(\lVert e \rVert_\Sigma)`.
 
-*Scale.*  A loss needs to know how large honest errors are.  Either it is told, or it looks: the adaptive scale
-is taken from the median error anew after every accepted step, as PTAM does.  An adaptive scale changes the objective as
-it goes; a step is always judged at one scale.
+*Scale.*  A loss needs to know how large honest errors are.  Either it is told, or it looks: the adaptive
+scale is taken from the median error anew after every accepted step, as PTAM does.  It changes the objective
+as it goes; a step is always judged at one scale.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -41,7 +42,7 @@ class Robust:
         On a scale that is not positive.
     """
 
-    loss: Loss = L2()
+    loss: Loss = field(default_factory=L2)
     scale: ScaleRule = 1.0
     least_scale: float = 0.4
 
@@ -57,6 +58,22 @@ class Robust:
             return float(self.scale)
         found = norm_scale(errors[valid])
         return max(found.sigma, self.least_scale)
+
+
+def whitener(cov_uv: Array) -> Array:
+    """U (n, 2, 2) with U^T U the inverse of a covariance (n, 2, 2): the inverse of its Cholesky factor."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(cov_uv)))
+
+
+def whitened(cov_uv: Array | None, r: Array) -> Array:
+    """Residuals (n, 2) in standard deviations; as they are without covariances.
+
+    Examples
+    --------
+    >>> whitened(np.diag([4.0, 9.0])[None], np.array([[2.0, 3.0]]))
+    array([[1., 1.]])
+    """
+    return r if cov_uv is None else np.einsum("nab,nb->na", whitener(cov_uv), r)
 
 
 class Weighted(NamedTuple):
