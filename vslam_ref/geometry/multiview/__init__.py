@@ -5,7 +5,7 @@ module                   holds
 =======================  ==========================================================================
 ``views``                cameras and poses as arrays over views; rays and pixels of all of them
 ``epipolar``             what a point in one image says about the other
-``midpoint``             where two rays pass closest, with exact Jacobians
+``closest_point``        where two rays pass closest, with exact Jacobians
 ``triangulation``        points from any number of views: linear, then optimal, with covariance
 ``two_view_optimum``     the global optimum for two views, from a polynomial of degree six
 ``three_points``         every camera that sees three points where they were seen (P3P)
@@ -17,6 +17,7 @@ Point sets are aligned by :mod:`vslam_ref.geometry.alignment`.  A pose is refine
 """
 
 from vslam_ref.geometry.alignment import Alignment, align
+from vslam_ref.geometry.multiview.closest_point import midpoint, midpoint_with_jacobians
 from vslam_ref.geometry.multiview.epipolar import (
     epipolar_distance,
     essential_from_motion,
@@ -24,7 +25,6 @@ from vslam_ref.geometry.multiview.epipolar import (
     relative_motion,
     sampson_distance,
 )
-from vslam_ref.geometry.multiview.midpoint import midpoint, midpoint_with_jacobians
 from vslam_ref.geometry.multiview.point_state import PointState
 from vslam_ref.geometry.multiview.resection import LinearPose, PoseState, dlt, planar_dlt, resect_linear
 from vslam_ref.geometry.multiview.three_points import ThreePointPoses, p3p

@@ -41,7 +41,8 @@ def descend(views: Views, uv: Array, root: Array, X_start: Array, max_iterations
     X, at = X_start.copy(), _linearise(views, uv, root, X_start)
     damping = np.full(len(X), FIRST)
     iterations = np.zeros(len(X), dtype=np.int64)
-    settled = SETTLED + _rounding(uv, root)
+    rounding = _rounding(uv, root)
+    settled = SETTLED + rounding
     converged = _decrement(at) <= settled
     stuck = ~np.isfinite(at.cost)
     for _ in range(max_iterations):
@@ -53,8 +54,8 @@ def descend(views: Views, uv: Array, root: Array, X_start: Array, max_iterations
         trial = X[go] - _solve(damped, at.g[go])
         new = _linearise(views, uv[go], root[go], trial)
         better = new.cost < at.cost[go]  # False for infinity: behind a camera
-        # at the bottom the cost is rounding: a step counts there if it leaves a shorter one to go
-        level = np.abs(new.cost - at.cost[go]) <= 1e-13 * at.cost[go]
+        # at the bottom costs differ by rounding, r dr: a step counts if it leaves a shorter one to go
+        level = np.abs(new.cost - at.cost[go]) <= np.sqrt(2.0 * at.cost[go] * rounding[go])
         better |= level & (_decrement(new) < 0.25 * _decrement(_Linear(*(a[go] for a in at))))
         won = go[better]
         X[won] = trial[better]

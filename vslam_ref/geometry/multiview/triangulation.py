@@ -139,7 +139,7 @@ def triangulate_linear(
     R, p = se3.rotation(T), (camera_pose.centre_from_pose(T) - middle) / size
     near = np.concatenate([R, -times(R, p)[..., None]], -1)  # [R | t] in the moved and scaled world
     rows = (across(b) @ near) * used[..., None, None]  # (N, V, 2, 4)
-    _, s, Vt = np.linalg.svd(rows.reshape(len(b), -1, 4), full_matrices=True)
+    _, s, Vt = np.linalg.svd(rows.reshape(len(b), 2 * len(T), 4), full_matrices=True)
     s = np.pad(s, ((0, 0), (0, 4 - s.shape[1])))  # a single view has two singular values only
     h = Vt[:, 3]
     flat = (s[:, 2] <= RANK * s[:, 0]) | (np.abs(h[:, 3]) <= FAR)

@@ -119,13 +119,15 @@ def correct_pair(F: ArrayLike, uv_a: ArrayLike, uv_b: ArrayLike) -> CorrectedPai
 def _turn(uv: Array, epipole: Array) -> tuple[Array, Array]:
     """Motions (N, 3, 3) from turned to original images, and the third coordinate (N,) of the epipole."""
     shifted = epipole[:2] - epipole[2] * uv
+    # a point within 1e-8 of the epipole has no direction to it: any will do, at that distance
+    least = 1e-8 * np.abs(epipole[2]) * np.maximum(1.0, np.abs(uv).max(axis=1, initial=0.0))
     length = np.linalg.norm(shifted, axis=1)
-    at = length <= 1e-300  # the measured point is the epipole: any direction will do
+    at = length <= least
     along = np.where(at[:, None], np.array([1.0, 0.0]), shifted / np.where(at, 1.0, length)[:, None])
     T = np.zeros((len(uv), 3, 3))
     T[:, :2, 0], T[:, 0, 1], T[:, 1, 1] = along, -along[:, 1], along[:, 0]
     T[:, :2, 2], T[:, 2, 2] = uv, 1.0
-    return T, epipole[2] / np.where(at, 1e-300, length)
+    return T, epipole[2] / np.where(at, least, length)
 
 
 def _form(turned: Array, f: Array, g: Array) -> _Form:
