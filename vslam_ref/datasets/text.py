@@ -1,4 +1,4 @@
-"""Reading numbers from text files that others wrote: plain or gzipped, with errors that say where.
+"""Reading numbers from text files that others wrote: plain or packed, with errors that say where.
 
 Every error of this room is a :class:`FormatError`: one line with the file, the line number, what is
 wrong and what would be right.  Decompression stops at a limit, so a small file cannot fill the memory.
@@ -6,12 +6,13 @@ wrong and what would be right.  Decompression stops at a limit, so a small file 
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import math
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ IntArray = NDArray[np.int64]
 
 MAX_BYTES = 64 * 2**20
 """Unpacked size at which reading stops; the largest known log of this kind has 3 MiB."""
+_PIECE = 2**20
 
 
 class FormatError(ValueError):
@@ -53,35 +55,82 @@ def existing(folder: Path, name: str) -> Path:
     raise FormatError(folder / name, None, "no such file, plain or with .gz")
 
 
+def read_bytes(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
+    """Read a file, unpacked if its name ends in ``.gz`` or ``.bz2``.
+
+    It is read piece by piece, and no more than one piece beyond the limit is ever unpacked.
+
+    Raises
+    ------
+    FormatError
+        On a missing file, a damaged archive, or more than ``max_bytes``.
+    """
+    kind = {".gz": "gzip", ".bz2": "bzip2"}.get(path.suffix, "")
+    pieces: list[bytes] = []
+    left = max_bytes
+    try:
+        with open_packed(path) as stream:
+            while piece := stream.read(_PIECE):
+                pieces.append(piece)
+                left -= len(piece)
+                if left < 0:
+                    right = f"expected at most {max_bytes}; is this the right file?"
+                    raise FormatError(path, None, f"more than {max_bytes} bytes unpacked; {right}")
+    except FileNotFoundError:
+        raise FormatError(path, None, "no such file") from None
+    except (OSError, EOFError, zlib.error) as error:
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+        if not kind or isinstance(error, IsADirectoryError | PermissionError):
+            raise FormatError(path, None, f"cannot be read ({reason}); expected a file") from None
+        raise FormatError(path, None, f"damaged {kind} file ({reason}); fetch it again") from None
+    return b"".join(pieces)
+
+
+def open_packed(path: Path) -> IO[bytes]:
+    """Open a file for reading bytes, unpacked on the way if its name ends in ``.gz`` or ``.bz2``."""
+    if path.suffix == ".gz":
+        return cast("IO[bytes]", gzip.open(path, "rb"))
+    return bz2.open(path, "rb") if path.suffix == ".bz2" else path.open("rb")
+
+
+def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
+    """Read a text file as :func:`read_bytes` does; a byte order mark is dropped.
+
+    Raises
+    ------
+    FormatError
+        As :func:`read_bytes`, and on bytes that are no text.
+    """
+    data = read_bytes(path, max_bytes)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise FormatError(path, line, "not a text file; UTF-8 expected") from None
+
+
 def read_lines(path: Path, max_bytes: int = MAX_BYTES) -> Iterator[tuple[int, str]]:
     """Yield (line number, text) of the lines that are neither empty nor ``#`` comments.
 
     Raises
     ------
     FormatError
-        On a damaged archive, more than ``max_bytes`` of text, or bytes that are no text.
+        As :func:`read_text`.
     """
-    try:
-        with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as stream:
-            data = stream.read(max_bytes + 1)
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise FormatError(path, None, f"damaged gzip file ({error}); fetch it again") from None
-    if len(data) > max_bytes:
-        raise FormatError(path, None, f"more than {max_bytes} bytes unpacked; is this the right file?")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise FormatError(path, line, "not a text file; UTF-8 expected") from None
-    for number, line_text in enumerate(text.splitlines(), 1):
+    for number, line_text in enumerate(read_text(path, max_bytes).splitlines(), 1):
         stripped = line_text.strip()
         if stripped and not stripped.startswith("#"):
             yield number, stripped
 
 
 def number(path: Path, line: int, word: str, name: str) -> float:
-    """Read one finite number, or raise :class:`FormatError` with the column's name."""
+    """Read one finite number, or raise :class:`FormatError` with the column's name.
+
+    Python's own ``1_000`` and digits of other scripts are no numbers of a file.
+    """
     try:
+        if "_" in word or not word.isascii():
+            raise ValueError
         value = float(word)
     except ValueError:
         raise FormatError(path, line, f"{name} is {word!r}; expected a number") from None

@@ -1,0 +1,87 @@
+"""Any bundle file: the reader chosen by what the file begins with, the writer by the name."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+from vslam_ref.datasets.bundle_files.bal import read_bal, write_bal
+from vslam_ref.datasets.bundle_files.bundler import read_bundler
+from vslam_ref.datasets.bundle_files.colmap import read_colmap, write_colmap
+from vslam_ref.datasets.bundle_files.libmv import ORDERS, SPACES, read_libmv
+from vslam_ref.datasets.bundle_files.ply import write_ply
+from vslam_ref.datasets.bundle_files.record import BundleFile
+from vslam_ref.datasets.text import FormatError, open_packed
+
+READERS = {"bal": read_bal, "bundler": read_bundler, "libmv": read_libmv, "colmap": read_colmap}
+RIGHT = "expected BAL (three counts), Bundler (# Bundle file v0.3), libmv (vP…), or a folder of COLMAP's text"
+
+
+def detect(path: Path | str) -> str:
+    """Tell the format from the first bytes: "bal", "bundler", "libmv", or "colmap" for a folder.
+
+    Raises
+    ------
+    FormatError
+        If there is no such file, or it is none of these.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return "colmap"
+    if not path.is_file():
+        raise FormatError(path, None, "no such file or folder")
+    try:
+        with open_packed(path) as stream:
+            head = stream.read(256)
+    except (OSError, EOFError, zlib.error) as error:
+        told = " ".join(str(error).split())
+        raise FormatError(path, None, f"cannot be unpacked ({told}); fetch it again") from None
+    if head[:1] in ORDERS and head[1:2] in SPACES:
+        return "libmv"
+    start = head.lstrip()
+    if start.startswith(b"# Bundle file"):
+        return "bundler"
+    if start[:1].isdigit():
+        return "bal"
+    shown = head[:24].decode("ascii", "backslashreplace") if head else "nothing"
+    raise FormatError(path, None, f"begins with {shown!r}; {RIGHT}")
+
+
+def read_bundle(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
+    """Read a bundle adjustment problem of any format that is known.
+
+    Parameters
+    ----------
+    path : Path or str
+        A file, or the folder of a COLMAP model.
+    max_bytes : int, optional
+        Limit of the unpacked size of a file; see :func:`.loading.load`.
+
+    Raises
+    ------
+    FormatError
+        Where the file is of no known format, or not as its format says.
+    """
+    return READERS[detect(path)](path, max_bytes=max_bytes)
+
+
+def write_bundle(path: Path | str, file: BundleFile) -> None:
+    """Write a file in the format that its name says.
+
+    ``.ply`` is for viewers, ``.txt`` (and ``.gz``, ``.bz2``) is BAL, a name without a suffix a COLMAP folder.
+
+    Raises
+    ------
+    ValueError
+        On another suffix, or what the format cannot say.
+    """
+    path = Path(path)
+    if path.suffix == ".ply":
+        write_ply(path, file)
+    elif path.suffix == "" or path.is_dir():
+        write_colmap(path, file)
+    elif path.suffix in (".txt", ".gz", ".bz2"):
+        write_bal(path, file)
+    else:
+        right = ".ply, .txt, .txt.gz, .txt.bz2 (BAL), or none (a COLMAP folder)"
+        raise ValueError(f"{path}: suffix {path.suffix!r} is of no format that is written; use {right}")

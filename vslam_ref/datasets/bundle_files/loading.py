@@ -1,0 +1,111 @@
+"""Getting a bundle file into memory: how much is unpacked at most, and the checks that all formats share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from vslam_ref.datasets.text import Array, FormatError, IntArray, read_bytes
+from vslam_ref.geometry import so3
+
+LARGEST = 2 * 2**30
+"""Bytes.  The largest BAL problem, 13682 cameras and 29 million observations, has about 1.7 GB of text."""
+RATIO = 32
+"""Printed measurements shrink 3 to 5 times.  What shrinks more than this is no bundle file."""
+SMALL = 64 * 2**20
+"""Bytes that any archive may unpack to: text full of zeros shrinks a thousand times."""
+FARTHEST = 1e15
+"""A coordinate this large, beside another of 1, has no digits left for it."""
+UNIT_TOLERANCE = 1e-3
+"""Largest entry of R^T R - I that is taken for rounding: four decimals."""
+
+
+def load(path: Path, max_bytes: int | None = None) -> bytes:
+    """Read a file, unpacked if it ends in ``.gz`` or ``.bz2``.
+
+    Parameters
+    ----------
+    path : Path
+    max_bytes : int, optional
+        Limit of the unpacked size.  By default ``LARGEST``, and of an archive no more than ``RATIO`` times
+        its own size or ``SMALL``.
+
+    Raises
+    ------
+    FormatError
+        Beyond the limit, on a missing file, a damaged archive, or an empty one.
+    """
+    limit = max_bytes
+    if limit is None:
+        packed = path.suffix in (".gz", ".bz2") and path.is_file()
+        limit = min(LARGEST, max(SMALL, RATIO * path.stat().st_size)) if packed else LARGEST
+    data = read_bytes(path, limit)
+    if not data.strip():
+        raise FormatError(path, None, "the file is empty; expected a bundle adjustment problem")
+    return data
+
+
+def require_room(path: Path, line: int | None, told: str, needed: int, size: int) -> None:
+    """Refuse counts that cannot fit the file, before anything of their size is made.
+
+    Parameters
+    ----------
+    path, line
+        Where the counts stand.
+    told : str
+        The counts, in words.
+    needed, size : int
+        Bytes that they need at least, and that there are.
+    """
+    if needed > size:
+        what = f"{told} need at least {needed} bytes; the file has {size}: truncated, or a wrong count"
+        raise FormatError(path, line, what)
+
+
+def repeated(view: IntArray, point: IntArray) -> tuple[int, int] | None:
+    """First two observations that pair the same view and point, or None."""
+    order = np.lexsort((np.arange(len(view)), point, view))
+    again = np.flatnonzero((np.diff(view[order]) == 0) & (np.diff(point[order]) == 0))
+    if not len(again):
+        return None
+    k = again[np.argmin(order[again + 1])]
+    return int(order[k]), int(order[k + 1])
+
+
+def require_once(
+    path: Path,
+    view: IntArray,
+    point: IntArray,
+    line: Callable[[int], int | None],
+    names: Callable[[int], str],
+) -> None:
+    """Refuse a point that one view sees twice; ``line`` and ``names`` tell of an observation by number."""
+    twice = repeated(view, point)
+    if twice is not None:
+        first, second = twice
+        here, there = line(second), line(first)
+        place = f"observation {first}" if there is None else f"line {there}"
+        raise FormatError(path, here, f"{names(second)} again; {place} has it already, expected it once")
+
+
+def rotations(path: Path, R: Array, line: Callable[[int], int | None], what: str) -> Array:
+    """Rotations (V, 3, 3) nearest to the matrices of a file, which are rounded there.
+
+    Raises
+    ------
+    FormatError
+        If one is farther from a rotation than rounding explains.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max((1, 2), initial=0.0)
+        good = (off <= UNIT_TOLERANCE) & (np.linalg.det(R) > 0)
+    bad = np.flatnonzero(~good)
+    if len(bad):
+        k = int(bad[0])
+        with np.errstate(over="ignore", invalid="ignore"):
+            determinant = np.linalg.det(R[k])
+        told = f"R of {what} {k} is no rotation: R^T R is off by {off[k]:.3g}, determinant {determinant:.3g}"
+        raise FormatError(path, line(k), f"{told}; expected 0 and 1")
+    return np.asarray(so3.nearest(R)) if len(R) else R
