@@ -1,0 +1,96 @@
+"""What one observation of a cell says of S and of D, given what S said of it before.
+
+The report gives no table; it says only when D is high.  This one is ours, argued in chapter 19.
+
+========  ===========  ============  =================  ==========================================
+S_{t-1}   observation  S             D, ``"free"``      D, ``"unknown"`` (the report's text)
+========  ===========  ============  =================  ==========================================
+free      hit          low           **high**           low
+unknown   hit          **high**      low                **high**
+occupied  hit          **high**      low                low
+any       miss         low           low                low
+========  ===========  ============  =================  ==========================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.grids.log_odds import FREE, OCCUPIED, UNKNOWN, log_odds
+
+Array = NDArray[np.float64]
+Where = Literal["free", "unknown"]
+WHERES: tuple[Where, ...] = ("free", "unknown")
+
+
+class Steps(NamedTuple):
+    """Log-odds that an observation adds: (3, 2), states of S_{t-1} (free, unknown, occupied) x (miss, hit)."""
+
+    static: Array
+    dynamic: Array
+
+
+def _value(value: float, reason: str) -> float:
+    return field(default=value, metadata={"reason": reason})  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class InverseSensor:
+    """Probabilities of the table; every field says why it has its value.
+
+    Raises
+    ------
+    ValueError
+        If a high value is not in (0.5, 1) or a low one not in (0, 0.5).
+    """
+
+    s_high: float = _value(
+        0.8, "two hits decide a cell of S (0.94 > 0.9), one does not: a single hit may be noise"
+    )
+    s_low: float = _value(0.3, "a hit on free floor: something moves there, so S stays free")
+    s_miss: float = _value(
+        0.3, "three misses free a cell (0.07 < 0.1); weaker than a hit, as beams graze walls"
+    )
+    d_high: float = _value(
+        0.95, "one hit decides a cell of D (0.95 > 0.9): a thing that moves is there once only"
+    )
+    d_low: float = _value(0.1, "a hit that S explains: probably nothing moves there")
+    d_miss: float = _value(0.05, "one miss takes a decided cell of D back (0.95 -> 0.5): it has left")
+
+    def __post_init__(self) -> None:
+        """Check that high is high and low is low."""
+        for f in fields(self):
+            value = getattr(self, f.name)
+            low, high = (0.5, 1.0) if f.name.endswith("high") else (0.0, 0.5)
+            if not low < value < high:
+                raise ValueError(f"{f.name}={value!r}: must lie between {low:g} and {high:g}")
+
+    def steps(self, d_high_where: Where = "free") -> Steps:
+        """Return the table as log-odds.
+
+        Raises
+        ------
+        ValueError
+            If ``d_high_where`` is neither ``"free"`` nor ``"unknown"``.
+
+        Examples
+        --------
+        >>> steps = InverseSensor().steps("free")
+        >>> steps.static[FREE].round(2), steps.dynamic[FREE].round(2)  # (miss, hit)
+        (array([-0.85, -0.85]), array([-2.94,  2.94]))
+        """
+        if d_high_where not in WHERES:
+            raise ValueError(f"d_high_where={d_high_where!r}: must be one of {', '.join(WHERES)}")
+        static = np.empty((3, 2))
+        static[:, 0] = self.s_miss
+        static[[UNKNOWN, OCCUPIED], 1] = self.s_high
+        static[FREE, 1] = self.s_low
+        dynamic = np.empty((3, 2))
+        dynamic[:, 0] = self.d_miss
+        dynamic[:, 1] = self.d_low
+        dynamic[FREE if d_high_where == "free" else UNKNOWN, 1] = self.d_high
+        return Steps(log_odds(static), log_odds(dynamic))

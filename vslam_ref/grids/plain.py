@@ -1,0 +1,78 @@
+"""One occupancy grid that knows nothing of motion: the baseline.
+
+    L_t = L(occupied | o_t) + L_{t-1}
+
+This is A4.2 with a table that does not look at the past.  Evidence and bound are those of S, so that the two maps
+differ in one thing only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.grids.canvas import Canvas
+from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
+from vslam_ref.grids.rays import HIT, observed_cells
+from vslam_ref.grids.static_dynamic import MapConfig
+
+Array = NDArray[np.float64]
+
+
+class PlainMap(Canvas):
+    """An occupancy grid; of the :class:`MapConfig` it takes what is not about D.
+
+    Examples
+    --------
+    >>> from vslam_ref.grids import Scan
+    >>> grid = PlainMap()
+    >>> _ = grid.update([0, 0, 0], Scan(np.zeros(1), np.array([0.35]), 80.0, 0.0))
+    >>> grid.occupied().at([[0.05, 0.05], [0.35, 0.05], [0.45, 0.05]]).round(2)
+    array([-0.85,  1.39,  0.  ])
+    """
+
+    def __init__(self, config: MapConfig | None = None) -> None:
+        self.config = c = MapConfig() if config is None else config
+        super().__init__(c.resolution, c.usable_range, c.no_return, {"occupied": 0.0})
+        self._evidence = log_odds([c.sensor.s_miss, c.sensor.s_high])
+        self._bound = float(log_odds(c.s_most))
+
+    def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
+        flat = self.layers["occupied"].reshape(-1)
+        apply_plain(flat, self.lattice.shape[1], start, ends, hit, self._evidence, self._bound)
+
+    def occupied(self) -> LogOddsGrid:
+        """Return the map, a view that later scans change."""
+        return LogOddsGrid(self.lattice, self.layers["occupied"])
+
+
+@accelerated("grids:apply_plain")
+def apply_plain(
+    log_odds: Array,
+    columns: int,
+    start: Array,
+    ends: Array,
+    hit: NDArray[np.bool_],
+    evidence: Array,
+    bound: float,
+) -> None:
+    """Add one scan to a plain grid, in place.
+
+    Parameters
+    ----------
+    log_odds : ndarray, shape (rows * columns,)
+        The map, row by row.
+    columns : int
+        Cells in a row.
+    start, ends, hit
+        As for :func:`vslam_ref.grids.static_dynamic.apply_scan`.
+    evidence : ndarray, shape (2,)
+        Log-odds that a miss and a hit add.
+    bound : float
+        Largest log-odds.
+    """
+    at, observed = observed_cells(columns, start, ends, hit)
+    changed = log_odds.take(at)
+    changed += evidence.take(observed == HIT)
+    log_odds[at] = np.clip(changed, -bound, bound)

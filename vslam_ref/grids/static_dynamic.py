@@ -1,0 +1,243 @@
+"""Two maps of a world in which things move: S, what stays, and D, what is moving now.
+
+Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of a cell
+*before* the scan, and its log-odds are added.
+
+    L(S_t) = L(S | o_t, S_{t-1}) + L(S_{t-1})                                                    (A4.2)
+    L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                        (A4.3)
+    L(D_t) = L(D | o_t, S_{t-1})                     d_memory = "text"
+
+Three rules are added, each with a switch:
+
+* *lifetime*: a cell of D that was not looked at for ``d_lifetime`` seconds is unknown again.  D holds what is
+  there now.
+* *explained hits*: a hit within ``explained_by`` cells of a decided static cell is that cell's: noise of the range and
+  of the pose makes walls no movers.  0 is the table as it stands.
+* *settling* (the ageing variant): what was hit at every look for ``settle_seconds`` on free floor has come to stay.
+  S forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a
+  chair put down on once-free floor is dynamic for ever.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.grids import rays
+from vslam_ref.grids.canvas import Canvas
+from vslam_ref.grids.inverse_sensor import InverseSensor, Where
+from vslam_ref.grids.lattice import Lattice
+from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, FREE, OCCUPIED, UNKNOWN, LogOddsGrid, log_odds, states
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Memory = Literal["formula", "text"]
+NoReturn = Literal["ignore", "free"]
+
+
+@dataclass(frozen=True)
+class MapConfig:
+    """How S and D are made; every field says why it has its value."""
+
+    resolution: float = field(default=0.1, metadata={"reason": "a leg is one or two cells", "unit": "m"})
+    usable_range: float = field(
+        default=30.0, metadata={"reason": "beams half a degree apart are then 0.26 m apart", "unit": "m"}
+    )
+    no_return: NoReturn = field(
+        default="ignore", metadata={"reason": "glass and black things send nothing back, either"}
+    )
+    sensor: InverseSensor = field(default_factory=InverseSensor, metadata={"reason": "see there"})
+    d_memory: Memory = field(default="formula", metadata={"reason": "A4.3; 'text' is what A says beside it"})
+    d_high_where: Where = field(
+        default="free", metadata={"reason": "what moves shows itself where S was free; 'unknown' is A's text"}
+    )
+    explained_by: int = field(
+        default=1, metadata={"reason": "range noise moves a wall by one cell", "unit": "cells"}
+    )
+    settle_seconds: float | None = field(
+        default=None,
+        metadata={"reason": "None is A's table; a number lets what stands still become static", "unit": "s"},
+    )
+    d_lifetime: float = field(
+        default=1.0, metadata={"reason": "at 1 m/s a person has left its cells by then", "unit": "s"}
+    )
+    s_most: float = field(default=0.999, metadata={"reason": "S changes its mind after six misses"})
+    d_most: float = field(default=0.96, metadata={"reason": "D lets go at the first miss"})
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        Lattice(self.resolution)
+        if not (self.usable_range > 0 and math.isfinite(self.usable_range)):
+            raise ValueError(f"usable_range={self.usable_range!r} m: must be positive and finite")
+        if self.no_return not in ("ignore", "free"):
+            raise ValueError(f"no_return={self.no_return!r}: must be 'ignore' or 'free'")
+        if self.d_memory not in ("formula", "text"):
+            raise ValueError(f"d_memory={self.d_memory!r}: must be 'formula' or 'text'")
+        self.sensor.steps(self.d_high_where)
+        if not 0 <= self.explained_by <= 10:
+            raise ValueError(f"explained_by={self.explained_by!r} cells: must be between 0 and 10")
+        if self.settle_seconds is not None and not self.settle_seconds > 0:
+            raise ValueError(f"settle_seconds={self.settle_seconds!r}: must be positive, or None for never")
+        if not self.d_lifetime > 0:
+            raise ValueError(f"d_lifetime={self.d_lifetime!r} s: must be positive")
+        for name, least in (("s_most", 0.9), ("d_most", 0.9)):
+            if not least < getattr(self, name) < 1:
+                raise ValueError(f"{name}={getattr(self, name)!r}: must lie between {least:g} and 1")
+
+
+class StaticDynamicMap(Canvas):
+    """S and D, from one scan to the next.
+
+    Parameters
+    ----------
+    config : MapConfig
+
+    Notes
+    -----
+    Four numbers a cell: the log-odds of S and D, when the cell was last looked at, and since when every look
+    has been a hit.
+
+    Examples
+    --------
+    >>> from vslam_ref.grids import Scan
+    >>> grid = StaticDynamicMap()
+    >>> def look(time, wall):
+    ...     return grid.update([0, 0, 0], Scan(np.zeros(1), np.array([wall]), 80.0, time))
+    >>> for k in range(4):
+    ...     _ = look(0.1 * k, 3.05)
+    >>> _ = look(0.4, 2.05)  # something stands in the beam
+    >>> grid.static().at([[3.05, 0.05], [2.05, 0.05]]).round(1)
+    array([ 5.5, -4.2])
+    >>> grid.dynamic().at([[3.05, 0.05], [2.05, 0.05]]).round(1)
+    array([-3.2, -0.2])
+    """
+
+    def __init__(self, config: MapConfig | None = None) -> None:
+        self.config = c = MapConfig() if config is None else config
+        fills = {"static": 0.0, "dynamic": 0.0, "seen": -math.inf, "since": math.inf}
+        super().__init__(c.resolution, c.usable_range, c.no_return, fills)
+        self._steps = c.sensor.steps(c.d_high_where)
+        self._limits = limits(c)
+
+    def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
+        flat = (self.layers[name].reshape(-1) for name in ("static", "dynamic", "seen", "since"))
+        steps = self._steps
+        apply_scan(
+            *flat,
+            self.lattice.shape[1],
+            start,
+            ends,
+            hit,
+            steps.static,
+            steps.dynamic,
+            self._limits,
+            self.time,
+        )
+
+    def static(self) -> LogOddsGrid:
+        """Return S, a view that later scans change."""
+        return LogOddsGrid(self.lattice, self.layers["static"])
+
+    def dynamic(self) -> LogOddsGrid:
+        """Return D as it is now: cells that were not looked at for ``d_lifetime`` are unknown.
+
+        With ``d_memory="text"``, all cells but those of the last scan are.
+        """
+        age = self.time - self.layers["seen"]
+        oldest = max(self._limits[2], 0.0)
+        return LogOddsGrid(self.lattice, np.where(age <= oldest, self.layers["dynamic"], 0.0))
+
+    def observed(self) -> NDArray[np.bool_]:
+        """Return which cells (rows, columns) were ever looked at."""
+        seen: NDArray[np.bool_] = self.layers["seen"] > -math.inf
+        return seen
+
+
+def limits(config: MapConfig) -> Array:
+    """Return the numbers that :func:`apply_scan` needs: bounds of S and D, lifetime, settling, reach of a wall.
+
+    Without memory of D, its lifetime is negative: nothing is young enough.
+    """
+    bounds = log_odds([config.s_most, config.d_most])
+    lifetime = config.d_lifetime if config.d_memory == "formula" else -1.0
+    settle = math.inf if config.settle_seconds is None else config.settle_seconds
+    return np.array([*bounds, lifetime, settle, float(config.explained_by)])
+
+
+@accelerated("grids:apply_scan")
+def apply_scan(
+    s: Array,
+    d: Array,
+    seen: Array,
+    since: Array,
+    columns: int,
+    start: Array,
+    ends: Array,
+    hit: NDArray[np.bool_],
+    steps_s: Array,
+    steps_d: Array,
+    limits: Array,
+    now: float,
+) -> None:
+    """Change S and D, in place, by one scan.
+
+    Implements :eq:`eq-a4-2` and :eq:`eq-a4-3` in log-odds.
+
+    Parameters
+    ----------
+    s, d : ndarray, shape (rows * columns,)
+        Log-odds, row by row.
+    seen, since : ndarray, shape (rows * columns,)
+        Times: of the last look; from which on every look was a hit (inf after a miss).
+    columns : int
+        Cells in a row.
+    start : ndarray, shape (2,)
+        Where the laser is: (x, y) in cells from the map's corner.
+    ends : ndarray, shape (B, 2)
+        Where beams end, likewise; all inside.
+    hit : ndarray of bool, shape (B,)
+        Whether something is there.
+    steps_s, steps_d : ndarray, shape (3, 2)
+        From :meth:`InverseSensor.steps`.
+    limits : ndarray, shape (5,)
+        From :func:`limits`.
+    now : float
+        Time, later than before.
+    """
+    s_bound, d_bound, lifetime, settle, reach = limits.tolist()
+    at, observed = rays.observed_cells(columns, start, ends, hit)
+    is_hit = observed == rays.HIT
+    old_s = s.take(at)
+    state = states(old_s)  # of S_{t-1}
+
+    run_began = np.where(is_hit, np.minimum(since.take(at), now), np.inf)
+    settled = is_hit & (state == FREE) & (now - run_began >= settle)
+    old_s[settled], state[settled] = 0.0, UNKNOWN
+    old_d = np.where(now - seen.take(at) > lifetime, 0.0, d.take(at))
+
+    row_of_table = 2 * state + is_hit  # (state, miss or hit), flat
+    step_d = steps_d.take(row_of_table)
+    if reach > 0:
+        hits = np.flatnonzero(is_hit)
+        explained = hits[_near_static(s, columns, at[hits], int(reach))]
+        step_d[explained] = steps_d[OCCUPIED, 1]  # as if S were occupied here
+    s[at] = np.clip(old_s + steps_s.take(row_of_table), -s_bound, s_bound)
+    d[at] = np.clip(old_d + step_d, -d_bound, d_bound)
+    seen[at] = now
+    since[at] = run_began
+
+
+def _near_static(s: Array, columns: int, at: IntArray, reach: int) -> NDArray[np.bool_]:
+    """Whether a decided static cell lies within ``reach`` cells, diagonals included."""
+    row, column = np.divmod(at, columns)
+    offsets = np.arange(-reach, reach + 1)
+    rows = np.clip(row[:, None] + offsets, 0, len(s) // columns - 1)
+    near_columns = np.clip(column[:, None] + offsets, 0, columns - 1)
+    cells = rows[:, :, None] * columns + near_columns[:, None, :]
+    near: NDArray[np.bool_] = (s[cells] > DECIDED_LOG_ODDS).any(axis=(1, 2))
+    return near
