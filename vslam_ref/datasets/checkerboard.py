@@ -22,6 +22,8 @@ SUFFIXES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".
 MAX_PIXELS = 100_000_000
 LEAST_CORNERS = 3
 """The detector takes no smaller board, in either direction."""
+SMALLEST_SIDE = 32
+"""Pixels; no board can be seen in a smaller picture, and the detector fails on it."""
 WINDOW_SHARE = 0.2
 LARGEST_WINDOW = 11
 """Half of the refinement's window: this share of the distance of neighbours, and at most this many pixels.
@@ -103,9 +105,9 @@ def find_corners(image: NDArray[Any], columns: int, rows: int) -> Array | None:
 
     Notes
     -----
-    The refinement looks at a window of a fifth of the distance of neighbours to each side, and at 11 pixels at
-    most.  On the 26 pictures of ``opencv_samples`` this leaves errors of at most 0.6 pixels after calibration;
-    11 pixels throughout, as in many examples, leave errors of up to 5.
+    The refinement looks at a window of a fifth of the distance of neighbours to each side, and at 11 pixels
+    at most.  On the 26 pictures of ``opencv_samples`` this leaves errors of at most 0.6 pixels after
+    calibration; 11 pixels throughout, as in many examples, leave errors of up to 5.
     """
     import cv2
 
@@ -115,6 +117,8 @@ def find_corners(image: NDArray[Any], columns: int, rows: int) -> Array | None:
         raise ValueError(
             f"board {columns}x{rows}: at least {LEAST_CORNERS} inner corners each way can be found"
         )
+    if min(image.shape) < SMALLEST_SIDE:
+        return None
     found, corners = cv2.findChessboardCorners(image, (columns, rows))
     if not found:
         return None

@@ -59,8 +59,8 @@ def calibrate_robustly(
     Notes
     -----
     The scale is 0.849 times the median distance, corrected for the fitted parameters.  It stands still while
-    a loss is minimised; in between it is taken anew.  The start is least squares, so wrong corners may be a few
-    in a hundred, not the half.
+    a loss is minimised; in between it is taken anew.  The start is least squares, so a few
+    corners in a hundred may be wrong, not the half.
     """
     unit = tuned(loss, 2)
     result = calibrate(views, size, model, fixed=fixed, aspect=aspect)
