@@ -12,11 +12,13 @@ BoolArray = NDArray[np.bool_]
 
 
 class PointState(IntEnum):
-    """State of one point; the first that applies, in this order of severity.
+    """State of one point: the first of TOO_FEW, NO_RAY, ... that applies.
+
+    With too little parallax the side on which nearly parallel rays meet is noise, so that is told first.
 
     Examples
     --------
-    >>> PointState(4).reason
+    >>> PointState.BEHIND.reason
     'behind a camera that is said to see it'
     """
 
@@ -24,8 +26,8 @@ class PointState(IntEnum):
     TOO_FEW = 1
     NO_RAY = 2
     NO_DEPTH = 3
-    BEHIND = 4
-    SMALL_PARALLAX = 5
+    SMALL_PARALLAX = 4
+    BEHIND = 5
     NOT_CONVERGED = 6
 
     @property
@@ -39,7 +41,7 @@ _REASONS = {
     PointState.TOO_FEW: "fewer than two views",
     PointState.NO_RAY: "a pixel outside the camera's invertible field: it has no ray",
     PointState.NO_DEPTH: "the rays do not fix a point: one centre, all along the baseline, or parallel",
-    PointState.BEHIND: "behind a camera that is said to see it",
     PointState.SMALL_PARALLAX: "the rays differ by less than the smallest parallax: depth is mostly noise",
+    PointState.BEHIND: "behind a camera that is said to see it",
     PointState.NOT_CONVERGED: "the reprojection error did not settle",
 }

@@ -150,8 +150,8 @@ def triangulate_linear(
     depth = np.einsum("nvi,nvi->nv", b, se3.act(T, X[:, None]))
     behind = (used & (depth <= 0.0)).any(axis=1)
     state = np.full(len(b), PointState.OK, dtype=np.int8)
-    state[parallax < min_parallax] = PointState.SMALL_PARALLAX
     state[behind] = PointState.BEHIND
+    state[parallax < min_parallax] = PointState.SMALL_PARALLAX
     state[flat] = PointState.NO_DEPTH
     state[few] = PointState.TOO_FEW
     return LinearPoints(X, state, parallax)
@@ -223,9 +223,11 @@ def triangulate(
     blind = (used & ~rays.valid).any(axis=1) & (state != PointState.TOO_FEW)
     state[blind] = PointState.NO_RAY
     X[blind] = 0.0
-    go = np.flatnonzero((state == PointState.OK) | (state == PointState.SMALL_PARALLAX))
+    seen = (views.project(X).valid | ~used).all(axis=1)
+    go = np.flatnonzero(seen & ((state == PointState.OK) | (state == PointState.SMALL_PARALLAX)))
     end = descend(views, pixels[go], np.where(used, 1.0 / sigma, 0.0)[go], X[go], max_iterations)
     X[go] = end.X_world
+    state[~seen & (state == PointState.OK)] = PointState.NOT_CONVERGED  # outside a field: nowhere to start
     state[go[~end.converged & (state[go] == PointState.OK)]] = PointState.NOT_CONVERGED
     cov, rmse = np.tile(np.diag([np.inf] * 3), (len(X), 1, 1)), np.full(len(X), np.inf)
     cov[go], rmse[go] = end.cov_X, end.rmse_px
