@@ -1,4 +1,4 @@
-"""The loops and the blocks are one algorithm: same scene and same cost after every step, and no code in common."""
+"""The loops and the blocks are one algorithm: same scene and cost after every step, and no code in common."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("held", [[], [0], [0, 2]])
 def test_same_steps(name: str, held: list[int], rng: np.random.Generator) -> None:
-    """Relative tolerance 1e-7: the damped system has a condition of 1e8 or less, times 1e-16, over 6 steps."""
+    """Tolerance 1e-7: the damped system has a condition of 1e8 or less, times 1e-16, over 6 steps."""
     model, settings, loss = CASES[name]
     problem, truth = make(rng, model, **settings)
     problem = hold(problem, held, truth)

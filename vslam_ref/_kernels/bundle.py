@@ -1,4 +1,4 @@
-"""Numba twins of bundle adjustment's hot loops: one pass over the observations of each point, no temporaries."""
+"""Numba twins of bundle adjustment's hot loops: one pass over each point, no temporaries."""
 
 from __future__ import annotations
 
@@ -168,20 +168,50 @@ def polynomial_normal(
 
 
 @njit(cache=True)
-def _spans(columns, size):
-    """First and last column of each view, and whether they are all there is between."""
-    views, d = columns.shape
-    first, last = np.full(views, size), np.full(views, -1)
-    plain = np.zeros(views, dtype=np.bool_)
-    for i in range(views):
-        count = 0
-        for a in range(d):
-            p = columns[i, a]
-            if p < size:
-                count += 1
-                first[i], last[i] = min(first[i], p), max(last[i], p)
-        plain[i] = count == d and last[i] - first[i] == d - 1
-    return first, last, plain
+def _lenses_are_shared(columns, size):
+    """Whether a column beyond the pose belongs to more than one view."""
+    taken = np.zeros(size + 1, dtype=np.bool_)
+    for i in range(columns.shape[0]):
+        for a in range(6, columns.shape[1]):
+            if taken[columns[i, a]]:
+                return True
+            taken[columns[i, a]] = columns[i, a] < size
+    return False
+
+
+@njit(cache=True)
+def _span(at, size):
+    """First and last column of a part, and whether they are all there is between."""
+    first, last, count = size, -1, 0
+    for p in at:
+        if p < size:
+            count += 1
+            first, last = min(first, p), max(last, p)
+    return first, last, count == len(at) and last - first == len(at) - 1
+
+
+@njit(cache=True)
+def _add_part(parts, at, size, columns, span):
+    """Note the columns of one more part, and their span, width, and whether they are neighbours."""
+    width = len(at)
+    columns[parts, :width] = at
+    span[parts, 0], span[parts, 1], plain = _span(at, size)
+    span[parts, 2], span[parts, 3] = width, plain
+    return parts + 1
+
+
+@njit(cache=True)
+def _subtract_pairs(S, parts, V, columns, span):
+    """S -= V V^T, lower triangle, for all pairs of parts."""
+    for s in range(parts):
+        w = span[s, 2]
+        for t in range(parts):
+            if span[t, 0] > span[s, 1]:  # the whole block lies above the diagonal
+                continue
+            if span[s, 3] and span[t, 3] and span[t, 1] < span[s, 0]:
+                _subtract_block(S, span[s, 0], span[t, 0], V[s, :w], V[t, : span[t, 2]])
+            else:
+                _subtract_entries(S, columns[s, :w], columns[t, : span[t, 2]], V[s], V[t])
 
 
 @njit(cache=True)
@@ -197,12 +227,12 @@ def _subtract_block(S, row, column, V, Z):
 def _subtract_entries(S, rows, columns, V, Z):
     """The same entry by entry, where columns are fixed, shared, or on the diagonal."""
     size = len(S)
-    for a in range(V.shape[0]):
+    for a in range(len(rows)):
         p = rows[a]
         if p == size:
             continue
         v0, v1, v2 = V[a, 0], V[a, 1], V[a, 2]
-        for b in range(Z.shape[0]):
+        for b in range(len(columns)):
             if columns[b] <= p:
                 S[p, columns[b]] -= v0 * Z[b, 0] + v1 * Z[b, 1] + v2 * Z[b, 2]
 
@@ -239,36 +269,47 @@ def schur_complement(
                 for b in range(d):
                     if columns[i, b] <= p:
                         S[p, columns[i, b]] += B[i, a, b]
-    first, last, plain = _spans(columns, size)
-    longest = 0
+    shared = _lenses_are_shared(columns, size)
+    own = 6 if shared else d  # what a view has for itself
+    longest = 1
     for j in range(len(offsets) - 1):
         longest = max(longest, offsets[j + 1] - offsets[j])
-    V = np.empty((longest, d, 3))
+    # parts: one an observation and, of shared lenses, one a run
+    V, at, span = (
+        np.empty((2 * longest, d, 3)),
+        np.empty((2 * longest, d), _int),
+        np.empty((2 * longest, 4), _int),
+    )
+    run = 0
     for j in range(len(offsets) - 1):
-        begin, m = offsets[j], offsets[j + 1] - offsets[j]
+        begin, end = offsets[j], offsets[j + 1]
         m00, m01, m02, m11, m12, m22 = M[j, 0, 0], M[j, 0, 1], M[j, 0, 2], M[j, 1, 1], M[j, 1, 2], M[j, 2, 2]
-        if m00 == 0.0:
-            continue
         g0, g1, g2 = g_point[j, 0], g_point[j, 1], g_point[j, 2]
         u0, u1, u2 = m00 * g0, m01 * g0 + m11 * g1, m02 * g0 + m12 * g1 + m22 * g2
-        for s in range(m):
-            at = columns[view[begin + s]]
+        parts = 0
+        for o in range(begin, end):
+            parts = _add_part(parts, columns[view[o], :own], size, at, span)
+        lens_part = parts - 1
+        for o in range(begin, end):
+            if shared and run < len(runs) and runs[run] == o:
+                run += 1
+                lens_part += 1
+                V[lens_part] = 0.0
+                parts = _add_part(parts, columns[view[o], own:], size, at, span)
             for a in range(d):
-                w0, w1, w2 = W[begin + s, a, 0], W[begin + s, a, 1], W[begin + s, a, 2]
+                w0, w1, w2 = W[o, a, 0], W[o, a, 1], W[o, a, 2]
                 v0, v1, v2 = m00 * w0, m01 * w0 + m11 * w1, m02 * w0 + m12 * w1 + m22 * w2
-                V[s, a, 0], V[s, a, 1], V[s, a, 2] = v0, v1, v2
-                if at[a] < size:
-                    rhs[at[a]] += v0 * u0 + v1 * u1 + v2 * u2
-        for s in range(m):
-            i = view[begin + s]
-            for t in range(m):
-                k = view[begin + t]
-                if first[k] > last[i]:  # the whole block lies above the diagonal
-                    continue
-                if plain[i] and plain[k] and last[k] < first[i]:
-                    _subtract_block(S, first[i], first[k], V[s], V[t])
+                p = columns[view[o], a]
+                if p < size:
+                    rhs[p] += v0 * u0 + v1 * u1 + v2 * u2
+                if a < own:
+                    V[o - begin, a, 0], V[o - begin, a, 1], V[o - begin, a, 2] = v0, v1, v2
                 else:
-                    _subtract_entries(S, columns[i], columns[k], V[s], V[t])
+                    V[lens_part, a - own, 0] += v0
+                    V[lens_part, a - own, 1] += v1
+                    V[lens_part, a - own, 2] += v2
+        if m00 != 0.0:
+            _subtract_pairs(S, parts, V, at, span)
     return S, rhs
 
 

@@ -60,7 +60,8 @@ def adjust_and_clean(
     """Adjust, take out what is wrong, and adjust again until nothing new is wrong.
 
     An observation that was taken out is looked at again in every round, and comes back if the scene now
-    explains it.
+    explains it.  With a loss that gives up (Tukey), start near the minimum: what it gave up cannot pull
+    the scene to where it would be explained.
 
     Parameters
     ----------

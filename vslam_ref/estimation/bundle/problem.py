@@ -163,6 +163,11 @@ class BundleProblem:
         if parameters != len(self.model.names()):
             told = ", ".join(self.model.names())
             raise ValueError(f"intrinsics have {parameters} columns: {self.model.__name__} needs {told}")
+        for number, values in enumerate(self.scene.intrinsics):
+            try:
+                self.model.from_params(values)
+            except ValueError as error:
+                raise ValueError(f"intrinsics[{number}] make no {self.model.__name__}: {error}") from None
         self._require_range("view", self.seen.view, views)
         self._require_range("point", self.seen.point, points)
         self._require_once()

@@ -225,7 +225,8 @@ def _descend(run: _Run, here: _Point, progress: Progress | None) -> tuple[_Point
         if len(run.history) >= options.max_iterations:
             return here, ("max_iterations", f"{len(run.history)} steps tried")
         step = _step(run, system)
-        trial = None if step is None else run.point(_moved(run, here.state, step), here.weighted.sigma)
+        there = None if step is None else _moved(run, here.state, step)
+        trial = None if there is None else run.point(there, here.weighted.sigma)
         judged = _judge(run, here, trial, step, system)
         run.history.append(judged)
         if progress is not None:
@@ -284,24 +285,26 @@ def _step(run: _Run, system: _System) -> _Step | None:
     return _Step(view_step, point_step, math.sqrt(square), 0.5 * (run.damping * square - slope))
 
 
-def _moved(run: _Run, state: State, step: _Step) -> State:
-    """State after a step: Exp(xi) T, and sums."""
+def _moved(run: _Run, state: State, step: _Step) -> State | None:
+    """State after a step: Exp(xi) T, and sums; None where its intrinsics make no camera."""
     T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
     intrinsics = state.intrinsics.copy()
     # views that share a lens have equal steps of it: any of them tells
     intrinsics[run.problem.lens_of_view] += step.view[:, 6:] @ run.problem.free.intrinsics.T
+    if step.view.shape[1] > 6 and not possible(run.problem.model, intrinsics):
+        return None
     R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
     return State(R, t, state.X_world + step.point, intrinsics)
 
 
 def _judge(run: _Run, here: _Point, trial: _Point | None, step: _Step | None, system: _System) -> Iteration:
-    """Compare what a step brought with what it promised."""
+    """Compare what a step brought with what it promised; a step that leads nowhere is refused."""
     cost, sigma = here.weighted.cost, here.weighted.sigma
     if step is None or trial is None:
         return Iteration(cost, math.nan, system.gradient_norm, math.nan, run.damping, math.nan, False, sigma)
     # differences first, then the sum: equal digits of two large sums are not lost
     decrease = float((here.weighted.costs - trial.weighted.costs).sum())
-    decent = bool(np.isfinite(decrease)) and possible(run.problem.model, trial.state.intrinsics)
+    decent = bool(np.isfinite(decrease))
     gain = decrease / step.promised if step.promised > 0 else math.nan
     accepted = decent and gain > LEAST_GAIN
     after = trial.weighted.cost if accepted else cost

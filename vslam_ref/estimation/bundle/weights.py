@@ -36,6 +36,11 @@ class Robust:
     least_scale : float
         The adaptive scale is never less.  PTAM's is 0.4 pixels.
 
+    Notes
+    -----
+    The adaptive scale is that of the *residuals*.  Those of a fit with p parameters to m coordinates are smaller
+    than the errors by about (1 - p/m)^(1/2): with each point seen four times, by a fifth or more.
+
     Raises
     ------
     ValueError
