@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+HERE = str(Path(__file__).parent)
+if HERE not in sys.path:
+    sys.path.insert(0, HERE)
 
 MRCLAM = {
     "Barcodes.dat": "# subject barcode\n1 5\n2 14\n6 63\n7 81\n8 7\n",

@@ -26,6 +26,7 @@ left out, as libmv's own adjuster does, and counted in ``notes``.  The pixel's o
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -123,12 +124,11 @@ def _part(path: Path, data: bytes, at: int, order: str, name: str) -> tuple[NDAr
     end = at + 4 + count * kind.itemsize
     require_room(path, None, f"{count} {name}s (byte {at})", end, len(data))
     rows = np.frombuffer(data, kind, count, at + 4)
-    fields = [str(field[0]) for field in PARTS[name]]
-    for field in fields:
-        if field not in ("id", "view", "point"):
-            _require_numbers(path, rows[field].reshape(count, -1), f"{field} of {name}")
-    if "id" in fields:
-        _require_distinct(path, rows["id"], name)
+    for field, code, shape in PARTS[name]:
+        if code == "f4":
+            _require_numbers(path, rows[field].reshape(count, math.prod(shape)), f"{field} of {name}")
+        elif field == "id":
+            _require_distinct(path, rows[field], name)
     return rows, end
 
 

@@ -20,7 +20,7 @@ from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry import se3
 
 VERTEX = np.dtype([("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
-EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
+EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
 NAMES = {"<f8": "double", "|u1": "uchar", "<i4": "int"}
 POINT_COLOUR, CAMERA_COLOUR = (200, 200, 200), (213, 94, 0)
 """Light grey; vermilion, which the colour-blind tell from the other colours."""
@@ -101,8 +101,6 @@ def _cameras(file: BundleFile, depth: float, first: int) -> tuple[NDArray[np.voi
     pairs: IntArray = (first + 5 * np.arange(len(world))[:, None, None] + PYRAMID).reshape(-1, 2)
     edges = np.zeros(len(pairs), EDGE)
     edges["vertex1"], edges["vertex2"] = pairs.T
-    for name, value in zip(("red", "green", "blue"), CAMERA_COLOUR, strict=True):
-        edges[name] = value
     return vertices, edges
 
 

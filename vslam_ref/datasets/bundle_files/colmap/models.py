@@ -92,7 +92,7 @@ def params_to_colmap(model: type[Camera], params: Array, told: str = "") -> tupl
     if not able:
         raise ValueError(f"COLMAP has no camera model for {model.__name__}")
     name = told if told in able else min(able, key=lambda name: len(PARAMETERS[name]))
-    return name, [ours[parameter] for parameter in PARAMETERS[name]]
+    return name, [ours.get(parameter, 0.0) for parameter in PARAMETERS[name]]
 
 
 def _can_say(name: str, ours: dict[str, float]) -> bool:
