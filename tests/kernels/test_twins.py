@@ -169,8 +169,8 @@ def for_apply_plain(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 
 
 def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    """All three states, cells never seen and long not seen, hits that settle; walls that reach 0 or 1 cell."""
-    s, d = rng.uniform(-4, 4, (2, 2000))
+    """All states; cells never seen, and long not seen; hits that settle; walls that reach 0 or 1 cell."""
+    s, d = rng.uniform(-3, 3, (2, 2000))
     seen, since = rng.choice([-np.inf, 7.0, 9.5], 2000), rng.choice([np.inf, 5.0, 9.0], 2000)
     steps = rng.uniform(-2, 2, (2, 3, 2))
     limits = np.array([6.0, 3.0, rng.choice([-1.0, 1.0]), rng.choice([3.0, np.inf]), float(n % 2)])
@@ -255,10 +255,12 @@ def test_twin_does_what_numpy_does(twin: str, build: Callable[..., tuple[Any, ..
         if not isinstance(a, np.ndarray):
             continue
         assert a.shape == b.shape
+        changed += before is not None and not np.array_equal(before, a)
+        assert np.array_equal(np.isinf(a), np.isinf(b))  # a time may be infinite: never
+        a, b = (np.where(np.isinf(x), 0.0, x) for x in (a, b))
         assert np.isfinite(b).all()
         size = max(1.0, np.abs(a).max(initial=0.0))
         assert np.abs(a - b).max(initial=0.0) <= TOLERANCE * size**2
-        changed += before is not None and not np.array_equal(before, a)
     assert changed > 0 or also, "an in-place function that changes nothing was not tested"
 
 
@@ -271,7 +273,11 @@ def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, 
         a, b = copies(arguments), copies(arguments)
         b[0][...] += 1e-6
         r, s = outputs(twin, function(*a)), outputs(twin, function(*b))
-    pairs = [(u, v) for u, v in zip([*a, *r], [*b, *s], strict=True) if isinstance(u, np.ndarray)]
+    pairs = [
+        (np.nan_to_num(u), np.nan_to_num(v))
+        for u, v in zip([*a, *r], [*b, *s], strict=True)
+        if isinstance(u, np.ndarray) and u.dtype.kind in "fc"
+    ]
     assert max(np.abs(u - v).max(initial=0.0) for u, v in pairs) > TOLERANCE * 100
 
 

@@ -1,7 +1,7 @@
-"""Numba twins of the grids' hot loops: one walk per beam, then one visit per cell that was seen.
+"""Numba twins of the grids' hot loops: one walk per beam, then one pass over the scan's window.
 
-A beam is walked column by column along its longer axis, as in :mod:`vslam_ref.grids.rays`, with the height above
-the present row kept as an integer: no rounding, no division.
+A beam is walked column by column along its longer axis, as in :mod:`vslam_ref.grids.rays`, with the height
+above the present row kept as an integer: no rounding, no division.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-from vslam_ref._kernels._signature import changed, given, kernel
+from vslam_ref._kernels._signature import given, kernel
 
 QUANTA = 4096
 MAX_LENGTH = 16384
-MISS, HIT, EXPLAINED = 1, 2, 3
+UNSEEN, MISS, HIT, EXPLAINED = 0, 1, 2, 3
+FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 DECIDED_LOG_ODDS = np.log(0.9 / (1.0 - 0.9))
+LAYER = types.Array(types.float64, 1, "C")  # row by row: known to be contiguous, so loops become vector code
 
 
 @njit(cache=True)
@@ -33,17 +35,8 @@ def _quanta(x):
 
 
 @njit(cache=True)
-def _mark_cell(flat, order, n, at):
-    """Mark a cell as MISS, and put it in the list if it was unseen; returns the length of the list."""
-    order[n] = at
-    n += flat[at] == 0
-    flat[at] = max(flat[at], np.uint8(MISS))
-    return n
-
-
-@njit(cache=True)
-def _walk(flat, columns, order, n, x0, y0, x1, y1):
-    """Mark the cells that one beam, given in quanta, crosses; returns the length of the list."""
+def _walk(flat, columns, x0, y0, x1, y1):
+    """Mark MISS along one beam, given in quanta."""
     dx, dy = x1 - x0, y1 - y0
     sx = 1 if dx >= 0 else -1
     sy = 1 if dy >= 0 else -1
@@ -59,42 +52,34 @@ def _walk(flat, columns, order, n, x0, y0, x1, y1):
         du, dv, pu, pv, along, across = abs(dy), abs(dx), py, px, sy * columns, sx
     run, rise = du * QUANTA, dv * QUANTA
     height = pv * du - pu * dv  # above the present row, in 1 / run
-    last = max((pu + du + QUANTA - 1) // QUANTA, 1) - 1
-    left = max((pv + dv + QUANTA - 1) // QUANTA, 1) - 1  # rows still to climb
-    for _ in range(last):
-        n = _mark_cell(flat, order, n, at)
+    climb = max((pv + dv + QUANTA - 1) // QUANTA, 1) - 1  # rows still to come
+    for _ in range(max((pu + du + QUANTA - 1) // QUANTA, 1) - 1):
+        flat[at] = MISS
         height += rise
-        if height > run:  # leaves by the next row; at a corner it does not
-            n = _mark_cell(flat, order, n, at + across)
+        flat[at + (across if height > run else 0)] = MISS  # the next row, too; not by a corner
         up = height >= run
-        height -= run * up
-        left -= up
-        at += along + across * up
-    n = _mark_cell(flat, order, n, at)
-    if left > 0:
-        n = _mark_cell(flat, order, n, at + across)
-    return n
+        height -= run if up else 0
+        climb -= up
+        at += along + (across if up else 0)
+    flat[at] = MISS
+    if climb > 0:
+        flat[at + across] = MISS
 
 
 @njit(cache=True)
-def _mark(flat, columns, order, start, ends, hit, low):
-    """Mark all beams; returns how many cells are in the list."""
+def _mark(flat, columns, start, ends, hit, low):
     x0, y0 = _quanta(start[0] - low[0]), _quanta(start[1] - low[1])
-    n = 0
     for b in range(ends.shape[0]):
-        x1, y1 = _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1])
+        _walk(flat, columns, x0, y0, _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1]))
+    for b in range(ends.shape[0]):
         if hit[b]:
-            at = (y1 // QUANTA) * columns + x1 // QUANTA
-            order[n] = at
-            n += flat[at] == 0
-            flat[at] = HIT
-        n = _walk(flat, columns, order, n, x0, y0, x1, y1)
-    return n
+            x1, y1 = _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1])
+            flat[(y1 // QUANTA) * columns + x1 // QUANTA] = HIT
 
 
 @njit(cache=True)
-def _observe(start, ends, hit):
-    """(window, flat; its cells in the order in which they were first seen; its corner; its columns)."""
+def _look(start, ends, hit):
+    """(window, its first column and row)."""
     low, high = np.empty(2, np.int64), np.empty(2, np.int64)
     for a in range(2):
         least = most = start[a]
@@ -102,41 +87,30 @@ def _observe(start, ends, hit):
             least, most = min(least, ends[b, a]), max(most, ends[b, a])
         low[a], high[a] = np.int64(np.floor(least)) - 1, np.int64(np.floor(most)) + 2
     columns, rows = high[0] - low[0], high[1] - low[1]
-    window = np.zeros(rows * columns, np.uint8)
-    order = np.empty(rows * columns + 1, np.int64)
-    n = _mark(window, columns, order, start, ends, hit, low)
-    return window, order[:n], low, columns
-
-
-@kernel(changed(2, types.uint8), given(1), given(2), given(1, types.boolean))
-def mark_beams(window, start, ends, hit):
-    """Twin of :func:`vslam_ref.grids.rays.mark_beams`."""
-    _check(start, ends)
-    rows, columns = window.shape
     flat = np.zeros(rows * columns, np.uint8)
-    order = np.empty(rows * columns + 1, np.int64)
-    n = _mark(flat, columns, order, start, ends, hit, np.zeros(2, np.int64))
-    for k in range(n):
-        window[order[k] // columns, order[k] % columns] = flat[order[k]]
+    _mark(flat, columns, start, ends, hit, low)
+    return flat.reshape((rows, columns)), low
 
 
-@kernel(
-    changed(1), types.int64, given(1), given(2), given(1, types.boolean), given(1), types.float64
-)  # fmt: skip
+@kernel(LAYER, types.int64, given(1), given(2), given(1, types.boolean), given(1), types.float64)
 def apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
     """Twin of :func:`vslam_ref.grids.plain.apply_plain`."""
     _check(start, ends)
-    window, order, low, width = _observe(start, ends, hit)
-    base, more = low[1] * columns + low[0], columns - width
-    for k in range(order.shape[0]):
-        at = base + order[k] + (order[k] // width) * more
-        v = log_odds[at] + evidence[window[order[k]] - MISS]
-        log_odds[at] = min(max(v, -bound), bound)
+    window, low = _look(start, ends, hit)
+    miss_adds, hit_adds = evidence[0], evidence[1]
+    for r in range(window.shape[0]):
+        first = (r + low[1]) * columns + low[0]
+        part = log_odds[first : first + window.shape[1]]
+        for c in range(window.shape[1]):
+            look = window[r, c]
+            added = hit_adds if look == HIT else (miss_adds if look == MISS else 0.0)
+            v = part[c] + added
+            v = bound if v > bound else v
+            part[c] = -bound if v < -bound else v
 
 
 @njit(cache=True)
-def _near_static(s, columns, at, reach):
-    row, column = at // columns, at % columns
+def _near_static(s, columns, row, column, reach):
     for r in range(max(row - reach, 0), min(row + reach + 1, s.shape[0] // columns)):
         for c in range(max(column - reach, 0), min(column + reach + 1, columns)):
             if s[r * columns + c] > DECIDED_LOG_ODDS:
@@ -147,37 +121,44 @@ def _near_static(s, columns, at, reach):
 @njit(cache=True)
 def _state(log_odds):
     if log_odds > DECIDED_LOG_ODDS:
-        return 2
-    return 0 if log_odds < -DECIDED_LOG_ODDS else 1
+        return OCCUPIED
+    return FREE if log_odds < -DECIDED_LOG_ODDS else UNKNOWN
+
+
+@njit(cache=True)
+def _clipped(v, bound):
+    return min(max(v, -bound), bound)
 
 
 @kernel(
-    *(changed(1),) * 4, types.int64, given(1), given(2), given(1, types.boolean),
+    LAYER, LAYER, LAYER, LAYER, types.int64, given(1), given(2), given(1, types.boolean),
     given(2), given(2), given(1), types.float64,
 )  # fmt: skip
 def apply_scan(s, d, seen, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
     """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
     _check(start, ends)
     s_bound, d_bound, lifetime, settle, reach = limits[0], limits[1], limits[2], limits[3], int(limits[4])
-    window, order, low, width = _observe(start, ends, hit)
-    base, more = low[1] * columns + low[0], columns - width
+    window, low = _look(start, ends, hit)
     if reach > 0:  # before S changes
-        for k in range(order.shape[0]):
-            if window[order[k]] == HIT:
-                at = base + order[k] + (order[k] // width) * more
-                if _near_static(s, columns, at, reach):
-                    window[order[k]] = EXPLAINED
-    for k in range(order.shape[0]):
-        look = window[order[k]]
-        at = base + order[k] + (order[k] // width) * more
-        old = s[at]
-        state = _state(old)
-        is_hit = 1 if look >= HIT else 0
-        since[at] = min(since[at], now) if is_hit else np.inf
-        if is_hit and state == 0 and now - since[at] >= settle:
-            old, state = 0.0, 1
-        prior = 0.0 if now - seen[at] > lifetime else d[at]
-        step = steps_d[2, 1] if look == EXPLAINED else steps_d[state, is_hit]
-        s[at] = min(max(old + steps_s[state, is_hit], -s_bound), s_bound)
-        d[at] = min(max(prior + step, -d_bound), d_bound)
-        seen[at] = now
+        for r in range(window.shape[0]):
+            for c in range(window.shape[1]):
+                if window[r, c] == HIT and _near_static(s, columns, r + low[1], c + low[0], reach):
+                    window[r, c] = EXPLAINED
+    for r in range(window.shape[0]):
+        first = (r + low[1]) * columns + low[0]
+        for c in range(window.shape[1]):
+            look = window[r, c]
+            if look == UNSEEN:
+                continue
+            at = first + c
+            old = s[at]
+            state = _state(old)
+            is_hit = 1 if look >= HIT else 0
+            since[at] = min(since[at], now) if is_hit else np.inf
+            if is_hit and state == FREE and now - since[at] >= settle:
+                old, state = 0.0, UNKNOWN
+            prior = 0.0 if now - seen[at] > lifetime else d[at]
+            step = steps_d[OCCUPIED, 1] if look == EXPLAINED else steps_d[state, is_hit]
+            s[at] = _clipped(old + steps_s[state, is_hit], s_bound)
+            d[at] = _clipped(prior + step, d_bound)
+            seen[at] = now

@@ -20,8 +20,8 @@ Conventions: ``pose`` is (x, y, theta) of the laser in the world, metres and rad
 ``theta + angles[i]``.  Arrays of cells are ``(rows, columns)``: rows go along y, columns along x, cell
 ``[0, 0]`` lies at ``origin_xy``.  Times are seconds.
 
-This room does not import :mod:`vslam_ref.worlds`, nor the other way round: :meth:`StaticDynamicMap.update` takes
-anything with the fields of :class:`Scan`.
+This room does not import :mod:`vslam_ref.worlds`, nor the other way round:
+:meth:`StaticDynamicMap.update` takes anything with the fields of :class:`Scan`.
 """
 
 from vslam_ref.grids.inverse_sensor import InverseSensor

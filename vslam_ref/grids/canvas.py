@@ -28,7 +28,8 @@ class Canvas:
     beams : BeamCounts
         All beams so far, by kind.
     time : float
-        The clock: the last stamp, or the smallest later number where a stamp did not move forward; -inf at first.
+        The clock: the last stamp, or the next larger number where a stamp did not move forward; -inf at
+        first.
     """
 
     def __init__(

@@ -28,7 +28,7 @@ WHERES: tuple[Where, ...] = ("free", "unknown")
 
 
 class Steps(NamedTuple):
-    """Log-odds that an observation adds: (3, 2), states of S_{t-1} (free, unknown, occupied) x (miss, hit)."""
+    """Log-odds that an observation adds: (3, 2), S_{t-1} free, unknown or occupied x (miss, hit)."""
 
     static: Array
     dynamic: Array

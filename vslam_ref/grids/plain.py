@@ -2,8 +2,8 @@
 
     L_t = L(occupied | o_t) + L_{t-1}
 
-This is A4.2 with a table that does not look at the past.  Evidence and bound are those of S, so that the two maps
-differ in one thing only.
+This is A4.2 with a table that does not look at the past.  Evidence and bound are those of S, so that the
+two maps differ in one thing only.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vslam_ref._kernels import accelerated
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
-from vslam_ref.grids.rays import HIT, observed_cells
+from vslam_ref.grids.rays import HIT, MISS, look
 from vslam_ref.grids.static_dynamic import MapConfig
 
 Array = NDArray[np.float64]
@@ -39,8 +39,8 @@ class PlainMap(Canvas):
         self._bound = float(log_odds(c.s_most))
 
     def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
-        flat = self.layers["occupied"].reshape(-1)
-        apply_plain(flat, self.lattice.shape[1], start, ends, hit, self._evidence, self._bound)
+        layer, columns = self.layers["occupied"].reshape(-1), self.lattice.shape[1]
+        apply_plain(layer, columns, start, ends, hit, self._evidence, self._bound)
 
     def occupied(self) -> LogOddsGrid:
         """Return the map, a view that later scans change."""
@@ -72,7 +72,9 @@ def apply_plain(
     bound : float
         Largest log-odds.
     """
-    at, observed = observed_cells(columns, start, ends, hit)
-    changed = log_odds.take(at)
-    changed += evidence.take(observed == HIT)
-    log_odds[at] = np.clip(changed, -bound, bound)
+    rows, places, window = look(start, ends, hit)
+    part = log_odds.reshape(-1, columns)[rows, places]
+    hits = np.nonzero(window == HIT)
+    part += (window == MISS) * evidence[0]
+    part[hits] += evidence[1]
+    np.clip(part, -bound, bound, out=part)

@@ -1,17 +1,18 @@
 """Every cell that a beam crosses, once, and without rounding.
 
-A cell is the half-open square [i, i+1) x [j, j+1).  A beam *crosses* it if a part of the beam of positive length
-lies in it.  Touching a corner is not crossing; running along an edge is crossing the cell that owns the edge.
+A cell is the half-open square [i, i+1) x [j, j+1).  A beam *crosses* it if a part of the beam of positive
+length lies in it.  Touching a corner is not crossing; running along an edge is crossing the cell that owns the
+edge.
 
-How it stays exact.  Ends of beams are rounded to 1/4096 of a cell (24 micrometres at 0.1 m).  Beyond that all
-numbers are integers held in floating point.  Where a beam crosses the k-th line between columns, its height is
-n/d with integers n and d; the quotient is rounded, but its floor and ceiling are those of n/d, as long as n <
-2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last place of m is
-less.  Hence beams of up to :data:`MAX_LENGTH` cells.
+How it stays exact.  Ends of beams are rounded to 1/4096 of a cell (24 micrometres at 0.1 m).  Beyond that
+all numbers are integers held in floating point.  Where a beam crosses the k-th line between columns, its
+height is n/d with integers n and d; the quotient is rounded, but its floor and ceiling are those of n/d as long
+as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last place of m
+is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
 
-How it is counted without sorting.  Each beam is mirrored to run to the right and upwards, and walked along the
-axis on which it is longer.  In one column it then crosses one cell or two: from the row at which it enters
-to the row at which it leaves.
+How it is done without sorting.  Each beam is mirrored to run to the right and upwards, and walked along
+the axis on which it is longer.  In one column it then crosses one cell or two: from the row at which it
+enters to the row at which it leaves.
 """
 
 from __future__ import annotations
@@ -21,8 +22,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref._kernels import accelerated
-
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -30,7 +29,7 @@ QUANTA = 4096
 """Parts of a cell to which the ends of beams are rounded."""
 MAX_LENGTH = 16384
 """Cells per axis that a beam may span: 16384 * 4096 = 2^26, and products of two such numbers are exact."""
-GROUP = 32
+GROUP = 64
 """Beams that are walked together."""
 UNSEEN, MISS, HIT = 0, 1, 2
 """What a scan says of a cell."""
@@ -100,7 +99,7 @@ class Crossings(NamedTuple):
 
 
 def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
-    """Return every cell that each beam crosses, once, in the order of the beams.
+    """Return every cell that each beam crosses, once, in the order of the beams and along each.
 
     Parameters
     ----------
@@ -127,56 +126,43 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
     [[0, 0], [1, -1], [2, -2]]
     """
     w = walks(start, ends)
-    beams, found = [], []
-    for group in _groups(w.columns):
-        rows = _rows_of_columns(w, group)
-        b, k = np.nonzero(rows.crossed)
-        b2, k2 = np.nonzero(rows.second)
-        row = np.concatenate([rows.enter[b, k], rows.enter[b2, k2] + 1]).astype(np.int64)
-        beam, column = group[np.concatenate([b, b2])], np.concatenate([k, k2])
-        steep = w.steep[beam]
-        walked = np.stack([np.where(steep, row, column), np.where(steep, column, row)], 1)
-        beams.append(beam)
-        found.append((w.start[beam] + w.signs[beam] * walked, column, row))
-    if not beams:
-        return Crossings(np.zeros(0, np.int64), np.zeros((0, 2), np.int64))
-    beam = np.concatenate(beams)
-    cells, column, row = (np.concatenate(part) for part in zip(*found, strict=True))
+    every = np.arange(len(w.columns))
+    rows = _rows_of_columns(w, every)
+    here = np.arange(rows.enter.shape[1]) < w.columns[:, None]
+    beam = np.concatenate([np.nonzero(here)[0], np.nonzero(here & (rows.leave > rows.enter))[0]])
+    column = np.concatenate([np.nonzero(here)[1], np.nonzero(here & (rows.leave > rows.enter))[1]])
+    row = np.concatenate([rows.enter[here], rows.leave[here & (rows.leave > rows.enter)]]).astype(np.int64)
     order = np.lexsort((row, column, beam))
-    return Crossings(beam[order], cells[order, ::-1])
+    beam, column, row = beam[order], column[order], row[order]
+    steep = w.steep[beam]
+    walked = np.stack([np.where(steep, row, column), np.where(steep, column, row)], 1)
+    cells = w.start[beam] + w.signs[beam] * walked
+    return Crossings(beam, cells[:, ::-1].copy())
 
 
 class _Rows(NamedTuple):
-    """For G beams and K columns: row of entry; whether the column is crossed, and whether also row + 1."""
+    """Rows (G, K) at which beams enter and leave their columns; beyond a beam's end, its last row."""
 
     enter: Array
-    crossed: NDArray[np.bool_]
-    second: NDArray[np.bool_]
+    leave: Array
 
 
-def _groups(columns: IntArray) -> list[IntArray]:
-    """Split beams into groups of like length, whose tables stay in the processor's cache."""
-    order = np.argsort(columns)
-    return [order[first : first + GROUP] for first in range(0, len(order), GROUP)]
+def _rows_of_columns(w: Walks, beams: IntArray) -> _Rows:
+    """Rows in which some mirrored beams cross each of their columns."""
+    k = np.arange(int(w.columns[beams].max(initial=0)) + 1)
+    height = w.rise[beams, None] * k
+    height += w.offset[beams, None]
+    height /= w.run[beams, None]  # at the left line of column k
+    last = w.last_row[beams, None]
+    enter = np.floor(height[:, :-1])
+    enter[:, :1] = 0.0
+    np.minimum(enter, last, out=enter)
+    leave = np.ceil(height[:, 1:])  # at the right line, seen from below
+    leave -= 1.0
+    np.minimum(leave, last, out=leave)
+    return _Rows(enter, np.maximum(leave, enter, out=leave))
 
 
-def _rows_of_columns(w: Walks, group: IntArray) -> _Rows:
-    """Rows in which mirrored beams cross each of their columns."""
-    last = w.columns[group] - 1
-    k = np.arange(int(last[-1]) + 2)
-    height = w.rise[group, None] * k
-    height += w.offset[group, None]
-    height /= w.run[group, None]  # at the left line of column k
-    row = np.floor(height)
-    row[:, 0] = 0.0
-    second = (row[:, 1:] > row[:, :-1]) & (height[:, 1:] > row[:, 1:])  # not where it leaves by a corner
-    b = np.arange(len(group))
-    second[b, last] = w.last_row[group] > row[b, last]
-    crossed = k[:-1] <= last[:, None]
-    return _Rows(row[:, :-1], crossed, second & crossed)
-
-
-@accelerated("grids:mark_beams")
 def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
     """Mark in ``window`` (rows, columns) what a scan says: MISS where beams cross, HIT at their ends.
 
@@ -198,22 +184,23 @@ def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArra
     """
     w = walks(start, ends)
     strides = np.array([1, window.shape[1]])
-    steps = w.signs * strides
+    steps = (w.signs * strides).astype(np.float64)
     along = np.where(w.steep, steps[:, 1], steps[:, 0])
     across = np.where(w.steep, steps[:, 0], steps[:, 1])
-    first = w.start @ strides
+    first = (w.start @ strides).astype(np.float64)
     marks = np.zeros(window.size, dtype=np.uint8)
-    for group in _groups(w.columns):
-        rows = _rows_of_columns(w, group)
-        at = rows.enter * across[group, None].astype(np.float64)
-        at += np.arange(at.shape[1], dtype=np.float64) * along[group, None] + first[group, None]
-        cells = at.astype(np.int64)
-        marks[cells[rows.crossed]] = MISS
-        b, k = np.nonzero(rows.second)
-        marks[cells[b, k] + across[group[b]]] = MISS
+    order = np.argsort(w.columns)  # like lengths together
+    for beams in (order[n : n + GROUP] for n in range(0, len(order), GROUP)):
+        enter, leave = _rows_of_columns(w, beams)
+        column = np.minimum(np.arange(enter.shape[1]), w.columns[beams, None] - 1.0)
+        column *= along[beams, None]
+        column += first[beams, None]
+        for row in (enter, leave):
+            row *= across[beams, None]
+            row += column
+            marks[row.astype(np.int64)] = MISS
     marks[end_cells(ends[hit]) @ strides] = HIT
-    found = np.flatnonzero(marks)
-    window.reshape(-1)[found] = marks[found]
+    window[...] = np.maximum(window, marks.reshape(window.shape))
 
 
 def end_cells(ends: Array) -> IntArray:
@@ -222,20 +209,18 @@ def end_cells(ends: Array) -> IntArray:
     return cells
 
 
-def observed_cells(
-    columns: int, start: Array, ends: Array, hit: NDArray[np.bool_]
-) -> tuple[IntArray, NDArray[np.uint8]]:
-    """Return the cells of a map that a scan looks at, each once, and whether it was MISS or HIT.
+class Look(NamedTuple):
+    """What a scan says of some rows and columns of a map: ``window`` holds UNSEEN, MISS or HIT."""
 
-    Cells are counted row by row, ``columns`` to a row.  The work is done in the scan's bounding window.
-    """
+    rows: slice
+    columns: slice
+    window: NDArray[np.uint8]
+
+
+def look(start: Array, ends: Array, hit: NDArray[np.bool_]) -> Look:
+    """Return what a scan says, in its bounding window; arguments as for :func:`mark_beams`."""
     low = np.floor(np.minimum(ends.min(axis=0), start)).astype(np.int64) - 1
     high = np.floor(np.maximum(ends.max(axis=0), start)).astype(np.int64) + 2
     window = np.zeros((high[1] - low[1], high[0] - low[0]), dtype=np.uint8)
     mark_beams(window, start - low, ends - low, hit)
-    seen = np.count_nonzero(window, axis=1)
-    row = np.repeat(np.arange(len(window)), seen)
-    flat = window.reshape(-1)
-    index = np.flatnonzero(flat)
-    at = index + (row * (columns - window.shape[1]) + (low[1] * columns + low[0]))
-    return at, flat[index]
+    return Look(slice(low[1], high[1]), slice(low[0], high[0]), window)

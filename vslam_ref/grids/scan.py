@@ -131,7 +131,7 @@ class BeamCounts(NamedTuple):
 
 
 class Beams(NamedTuple):
-    """Beams that say something: ``angles`` and ``lengths`` (n,), whether each ends in a hit, and the counts."""
+    """Beams that say something: ``angles``, ``lengths`` (n,), whether each ends in a hit; all counted."""
 
     angles: Array
     lengths: Array

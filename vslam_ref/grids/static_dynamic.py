@@ -1,7 +1,7 @@
 """Two maps of a world in which things move: S, what stays, and D, what is moving now.
 
-Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of a cell
-*before* the scan, and its log-odds are added.
+Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of a
+cell *before* the scan, and its log-odds are added.
 
     L(S_t) = L(S | o_t, S_{t-1}) + L(S_{t-1})                                                    (A4.2)
     L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                        (A4.3)
@@ -11,10 +11,10 @@ Three rules are added, each with a switch:
 
 * *lifetime*: a cell of D that was not looked at for ``d_lifetime`` seconds is unknown again.  D holds what is
   there now.
-* *explained hits*: a hit within ``explained_by`` cells of a decided static cell is that cell's: noise of the range and
-  of the pose makes walls no movers.  0 is the table as it stands.
-* *settling* (the ageing variant): what was hit at every look for ``settle_seconds`` on free floor has come to stay.
-  S forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a
+* *explained hits*: a hit within ``explained_by`` cells of a decided static cell is that cell's: noise of the
+  range and of the pose makes walls no movers.  0 is the table as it stands.
+* *settling* (the ageing variant): what was hit at every look for ``settle_seconds`` on free floor has come to
+  stay.  S forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a
   chair put down on once-free floor is dynamic for ever.
 """
 
@@ -125,19 +125,10 @@ class StaticDynamicMap(Canvas):
         self._limits = limits(c)
 
     def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
-        flat = (self.layers[name].reshape(-1) for name in ("static", "dynamic", "seen", "since"))
+        layers = (self.layers[name].reshape(-1) for name in ("static", "dynamic", "seen", "since"))
         steps = self._steps
-        apply_scan(
-            *flat,
-            self.lattice.shape[1],
-            start,
-            ends,
-            hit,
-            steps.static,
-            steps.dynamic,
-            self._limits,
-            self.time,
-        )
+        columns = self.lattice.shape[1]
+        apply_scan(*layers, columns, start, ends, hit, steps.static, steps.dynamic, self._limits, self.time)
 
     def static(self) -> LogOddsGrid:
         """Return S, a view that later scans change."""
@@ -159,7 +150,7 @@ class StaticDynamicMap(Canvas):
 
 
 def limits(config: MapConfig) -> Array:
-    """Return the numbers that :func:`apply_scan` needs: bounds of S and D, lifetime, settling, reach of a wall.
+    """Return what :func:`apply_scan` needs: bounds of S and D, lifetime, settling, reach of a wall.
 
     Without memory of D, its lifetime is negative: nothing is young enough.
     """
@@ -210,34 +201,44 @@ def apply_scan(
         Time, later than before.
     """
     s_bound, d_bound, lifetime, settle, reach = limits.tolist()
-    at, observed = rays.observed_cells(columns, start, ends, hit)
-    is_hit = observed == rays.HIT
-    old_s = s.take(at)
-    state = states(old_s)  # of S_{t-1}
+    rows, places, window = rays.look(start, ends, hit)
+    missed, hits = window == rays.MISS, np.nonzero(window == rays.HIT)
+    whole = [layer.reshape(-1, columns) for layer in (s, d, seen, since)]
+    explained = _near_static(whole[0], hits[0] + rows.start, hits[1] + places.start, int(reach))
+    s, d, seen, since = (layer[rows, places] for layer in whole)  # views
 
-    run_began = np.where(is_hit, np.minimum(since.take(at), now), np.inf)
-    settled = is_hit & (state == FREE) & (now - run_began >= settle)
-    old_s[settled], state[settled] = 0.0, UNKNOWN
-    old_d = np.where(now - seen.take(at) > lifetime, 0.0, d.take(at))
+    # S_{t-1} in the cells that were hit, after settling
+    s_hit, began = s[hits], np.minimum(since[hits], now)
+    settled = (states(s_hit) == FREE) & (now - began >= settle)
+    s_hit[settled] = 0.0
+    state = states(s_hit)
 
-    row_of_table = 2 * state + is_hit  # (state, miss or hit), flat
-    step_d = steps_d.take(row_of_table)
-    if reach > 0:
-        hits = np.flatnonzero(is_hit)
-        explained = hits[_near_static(s, columns, at[hits], int(reach))]
-        step_d[explained] = steps_d[OCCUPIED, 1]  # as if S were occupied here
-    s[at] = np.clip(old_s + steps_s.take(row_of_table), -s_bound, s_bound)
-    d[at] = np.clip(old_d + step_d, -d_bound, d_bound)
-    seen[at] = now
-    since[at] = run_began
+    stale = (now - seen > lifetime) & (window != rays.UNSEEN)
+    d[stale] = 0.0
+    d_hit = d[hits] + np.where(explained, steps_d[OCCUPIED, 1], steps_d[state, 1])
+
+    d += missed * _of_state(s, steps_d[:, 0])
+    s += missed * _of_state(s, steps_s[:, 0])
+    d[hits], s[hits] = d_hit, s_hit + steps_s[state, 1]
+    np.clip(s, -s_bound, s_bound, out=s)
+    np.clip(d, -d_bound, d_bound, out=d)
+    seen[window != rays.UNSEEN] = now
+    since[missed] = np.inf
+    since[hits] = began
 
 
-def _near_static(s: Array, columns: int, at: IntArray, reach: int) -> NDArray[np.bool_]:
-    """Whether a decided static cell lies within ``reach`` cells, diagonals included."""
-    row, column = np.divmod(at, columns)
+def _of_state(s: Array, values: Array) -> Array:
+    """Pick one of three values by the state of every cell."""
+    undecided = np.where(s < -DECIDED_LOG_ODDS, values[FREE], values[UNKNOWN])
+    return np.where(s > DECIDED_LOG_ODDS, values[OCCUPIED], undecided)
+
+
+def _near_static(s: Array, row: IntArray, column: IntArray, reach: int) -> NDArray[np.bool_]:
+    """Whether a decided static cell lies within ``reach`` cells, diagonals included; never if 0."""
+    if reach == 0:
+        return np.zeros(len(row), dtype=np.bool_)
     offsets = np.arange(-reach, reach + 1)
-    rows = np.clip(row[:, None] + offsets, 0, len(s) // columns - 1)
-    near_columns = np.clip(column[:, None] + offsets, 0, columns - 1)
-    cells = rows[:, :, None] * columns + near_columns[:, None, :]
-    near: NDArray[np.bool_] = (s[cells] > DECIDED_LOG_ODDS).any(axis=(1, 2))
+    rows = np.clip(row[:, None] + offsets, 0, s.shape[0] - 1)
+    columns = np.clip(column[:, None] + offsets, 0, s.shape[1] - 1)
+    near: NDArray[np.bool_] = (s[rows[:, :, None], columns[:, None, :]] > DECIDED_LOG_ODDS).any(axis=(1, 2))
     return near
