@@ -166,7 +166,7 @@ def test_ptams_step_leaves_nine_tenths() -> None:
     least = 0.5 * float((best.residual**2).sum())
     gaps = [point.cost - least]
     for _ in range(40):
-        point = problem.at(ptam.ptam_step(problem, point))
+        point = problem.at(ptam.ptam_step(problem, point, SIZE))
         assert point is not None
         gaps.append(point.cost - least)
     ratios = np.array(gaps[1:]) / gaps[:-1]

@@ -19,6 +19,7 @@ module              holds
 """
 
 from vslam_ref.estimation.calibration import ptam, simulated
+from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
 from vslam_ref.estimation.calibration.homography import apply_homography, homography
 from vslam_ref.estimation.calibration.parameters import Free
@@ -48,6 +49,7 @@ __all__ = [
     "pose_from_homography",
     "poses_for",
     "ptam",
+    "reduce",
     "sensor_from_homographies",
     "simulated",
     "stack",

@@ -18,7 +18,7 @@ PRIOR = 1.0
 """What is added to the diagonal of J^T J."""
 
 
-def ptam_step(problem: Problem, here: Point) -> State:
+def ptam_step(problem: Problem, here: Point, size: tuple[int, int]) -> State:
     """State after one step.
 
     Implements :eq:`eq-ptam-step`.
@@ -26,8 +26,11 @@ def ptam_step(problem: Problem, here: Point) -> State:
     Parameters
     ----------
     problem : Problem
+        PTAM's own has the FOV lens; any other works too.
     here : Point
         The problem at the state before.
+    size : (int, int)
+        Width and height of the images, pixels.
 
     Raises
     ------
@@ -36,11 +39,13 @@ def ptam_step(problem: Problem, here: Point) -> State:
 
     Notes
     -----
-    PTAM's intrinsics are relative to the image's size, so that its unit prior weighs them otherwise: there
-    it adds 1 to a diagonal that is larger by the squared width.  Both are weak.
+    PTAM's focal lengths and centre are relative to the image's width and height.  A prior of 1 on them is one
+    of 1/width^2 on pixels: weak.  A prior of 1 on *pixels* would be none of PTAM's, and not weak at all.
     """
-    views, free = here.normal.g_pose.shape[0], len(here.normal.g_free)
-    step = damped_step(here.normal, PRIOR, Blocks(np.ones((views, 6)), np.ones(free)))
+    width, height = size
+    unit = {"fx": 1 / width, "fy": 1 / height, "cx": 1 / width, "cy": 1 / height}
+    scale = np.array([unit.get(name, 1.0) for name in problem.free.names])
+    step = damped_step(here.normal, PRIOR, Blocks(np.ones_like(here.normal.g_pose), scale))
     if step is None:
         raise ValueError("the normal equations are singular")
     return problem.plus(here.state, SHARE * step.pose, SHARE * step.free)
