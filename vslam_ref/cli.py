@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import NoReturn
 
 import vslam_ref
-from vslam_ref.commands import bench, calibrate, data, evaluate, reproduce, warm_cache
+from vslam_ref.commands import ba, bench, calibrate, data, evaluate, reproduce, warm_cache
 from vslam_ref.commands import list as list_command
 from vslam_ref.commands import run as run_command
 
@@ -35,6 +35,7 @@ COMMANDS: dict[str, ModuleType] = {
     "reproduce": reproduce,
     "run": run_command,
     "evaluate": evaluate,
+    "ba": ba,
     "calibrate": calibrate,
     "data": data,
     "bench": bench,

@@ -1,4 +1,4 @@
-"""Small scenes: cameras on an arc, points in a box, everything in front of the cameras and inside the lens."""
+"""Small scenes: cameras on an arc, points in a box, all in front of the cameras and inside the lens."""
 
 from __future__ import annotations
 

@@ -73,11 +73,15 @@ def accelerated(twin: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
     def declare(function: Callable[P, R]) -> Callable[P, R]:
         REGISTRY[f"{function.__module__}.{function.__qualname__}"] = (function, twin)
+        kernel: Callable[..., Any] | None = None
 
         @functools.wraps(function)
         def choose(*args: P.args, **kwargs: P.kwargs) -> R:
+            nonlocal kernel
             if _chosen == "numba" or (_chosen is None and backend() == "numba"):
-                return _load(twin)(*args, **kwargs)  # type: ignore[no-any-return]
+                if kernel is None:
+                    kernel = _load(twin)
+                return kernel(*args, **kwargs)  # type: ignore[no-any-return]
             return function(*args, **kwargs)
 
         return choose
@@ -88,13 +92,12 @@ def accelerated(twin: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 @functools.cache
 def _load(twin: str) -> Callable[..., Any]:
     module, _, name = twin.partition(":")
-    return getattr(importlib.import_module(f"{__name__}.{module}"), name)  # type: ignore[no-any-return]
+    kernel = getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    return importlib.import_module(f"{__name__}._signature").compiled(kernel)  # type: ignore[no-any-return]
 
 
-def warm() -> None:
-    """Compile every twin, or read it from the cache on disk, now.
-
-    A kernel has one explicit signature, so importing its module is all it takes.
-    """
+def warm(module: str = "") -> None:
+    """Compile every twin, or those of one module, or read them from the cache on disk, now."""
     for _, twin in REGISTRY.values():
-        _load(twin)
+        if twin.startswith(f"{module}:") or not module:
+            _load(twin)

@@ -98,6 +98,12 @@ class _Run:
     growth: float = 2.0
     history: list[Iteration] = field(default_factory=list)
 
+    @property
+    def floor(self) -> float:
+        """Cost of residuals that are nothing but the rounding of their pixels."""
+        uv = self.table.links.uv
+        return len(uv) * (8.0 * schur.EPS * max(1.0, float(np.abs(uv).max(initial=0.0)))) ** 2
+
     def point(self, state: State, sigma: float | None = None) -> _Point:
         """Evaluate a state, at a given scale or at its own."""
         r, valid = projection.residuals(self.problem.model, state, self.table.links)
@@ -219,6 +225,8 @@ def _descend(run: _Run, here: _Point, progress: Progress | None) -> tuple[_Point
     while True:
         if not here.weighted.weights.any():
             return here, ("all_outliers", f"no error is small against the scale {here.weighted.sigma:.3g}")
+        if here.weighted.cost <= run.floor:
+            return here, ("cost", f"residuals are zero to rounding, cost {here.weighted.cost:.3g}")
         system = system or _system(run, here)
         if system.gradient_norm <= options.gradient:
             return here, ("gradient", f"largest cosine {system.gradient_norm:.3g} <= {options.gradient:g}")

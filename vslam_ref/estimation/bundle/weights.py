@@ -38,8 +38,8 @@ class Robust:
 
     Notes
     -----
-    The adaptive scale is that of the *residuals*.  Those of a fit with p parameters to m coordinates are smaller
-    than the errors by about (1 - p/m)^(1/2): with each point seen four times, by a fifth or more.
+    The adaptive scale is that of the *residuals*.  Those of a fit with p parameters to m coordinates are
+    smaller than the errors by about (1 - p/m)^(1/2): with each point seen four times, by a fifth or more.
 
     Raises
     ------

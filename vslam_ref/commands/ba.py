@@ -1,0 +1,228 @@
+"""``vslam-ref ba``: bundle adjustment of a file."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vslam_ref.commands.options import add_json, json_target, write_json
+
+if TYPE_CHECKING:
+    from vslam_ref.datasets.bundle_files import BundleFile
+    from vslam_ref.estimation.bundle import BundleProblem, BundleResult, Iteration, Robust
+
+HELP = "adjust a bundle: cameras and points from their images"
+EPILOG = """\
+formats (told from the content): BAL text, plain or with .gz or .bz2; libmv .bin; Bundler bundle.out; a folder
+with COLMAP's cameras.txt, images.txt, points3D.txt
+
+losses: l2 (least squares, the default), huber, cauchy, geman-mcclure, tukey. A robust loss needs the size of
+an honest error: a number of pixels, or 'adaptive', from the median of the errors after every step, as in PTAM.
+
+Poses and points move; of the intrinsics those that the format says, or those that --free names (f is one
+focal length for both axes, 'none' is none). Nothing is written where there is nothing to adjust.
+
+examples:
+  vslam-ref ba problem-16-22106-pre.txt.bz2 --json result.json --ply scene.ply
+  vslam-ref ba problem_01.bin --free f --loss tukey --scale 1.5
+  vslam-ref ba sparse/ --out adjusted/ --set cost=1e-10 --set max_iterations=200"""
+
+LOSSES = ("l2", "huber", "cauchy", "geman-mcclure", "tukey")
+BACKENDS = ("auto", "numpy", "numba")
+HOPELESS = {
+    "no_observations": "has no observations",
+    "no_images": "has every observed point behind its camera",
+    "all_outliers": "has no error that is small against the scale",
+    "nothing_free": "has nothing that may move",
+    "not_finite": "has a cost that is not finite",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this command."""
+    parser.add_argument("file", metavar="FILE", help="the problem; see below")
+    parser.add_argument("--loss", choices=LOSSES, default="l2", help="loss of an error (default: l2)")
+    parser.add_argument(
+        "--scale",
+        metavar="PIXELS",
+        help="standard deviation of an honest error, or 'adaptive' (default with a robust loss)",
+    )
+    parser.add_argument("--free", metavar="NAMES", help="intrinsics that move, as f,k1,k2; or none")
+    parser.add_argument(
+        "--gauge",
+        choices=("free", "fixed"),
+        default="free",
+        help="fixed: hold the first view, and the scale (default: free)",
+    )
+    parser.add_argument("--backend", choices=BACKENDS, default="auto", help="NumPy or Numba (default: auto)")
+    parser.add_argument(
+        "--out", metavar="FILE", help="write the result: BAL (.txt, .gz, .bz2) or a COLMAP folder"
+    )
+    parser.add_argument("--ply", metavar="FILE", help="write points and cameras for a viewer")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="cost, gradient, scale, max_iterations, damping, method; may be repeated",
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, adjust, print the numbers and write what was asked for."""
+    from vslam_ref import _kernels
+    from vslam_ref.datasets.bundle_files import read_bundle
+    from vslam_ref.estimation.bundle import Options, bundle_adjust
+    from vslam_ref.estimation.bundle.diagnosis import diagnose
+    from vslam_ref.experiments.framework.config import apply_overrides
+
+    targets = _targets(options)
+    settings = apply_overrides(Options(), options.set)
+    robust = _robust(options.loss, options.scale)
+    file = read_bundle(Path(options.file))
+    problem = _problem(file, options)
+    views, points, seen = problem.sizes
+    print(f"{options.file}: {views} cameras, {points} points, {seen} observations")
+    for note in [*file.notes, *diagnose(problem).sentences()]:
+        print(f"note: {note}")
+    with _kernels.use_backend(options.backend) as backend:
+        if backend == "numba":
+            _kernels.warm("bundle")  # compiling is no part of the time
+        wall, cpu = time.perf_counter(), time.process_time()
+        result = bundle_adjust(problem, robust, settings, _Table())
+        seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
+    if result.reason in HOPELESS:
+        raise ValueError(f"{options.file} {HOPELESS[result.reason]}: nothing was adjusted, nothing written")
+    numbers = _numbers(result) | {"seconds": seconds, "cpu_seconds": cpu_seconds, "backend": backend}
+    _show(numbers, result)
+    _write(targets, file, result)
+    write_json(targets["json"], {key: numbers[key] for key in KEYS})
+    return 0
+
+
+KEYS = (
+    "cameras",
+    "points",
+    "observations",
+    "initial_cost",
+    "final_cost",
+    "iterations",
+    "seconds",
+    "cpu_seconds",
+    "backend",
+    "reason",
+    "rmse_px",
+    "sigma",
+    "set_aside",
+)
+
+
+def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
+    """Checked paths of all outputs, before any work."""
+    from vslam_ref.experiments.framework import files
+
+    targets = {"json": json_target(options)}
+    for name in ("out", "ply"):
+        given = getattr(options, name)
+        targets[name] = None if given is None else files.require_parent(given)
+    return targets
+
+
+def _robust(name: str, scale: str | None) -> Robust:
+    """The loss with its 95 % constant for plane errors, and its scale."""
+    from vslam_ref.estimation.bundle import Robust
+    from vslam_ref.estimation.robust import LOSSES as BY_NAME
+    from vslam_ref.estimation.robust import TUNED_95
+
+    if name == "l2":
+        if scale is not None:
+            raise ValueError("--scale: least squares has no scale; choose a robust --loss")
+        return Robust()
+    loss = BY_NAME[name](TUNED_95[name, 2])
+    if scale in (None, "adaptive"):
+        return Robust(loss, "adaptive")
+    try:
+        return Robust(loss, float(scale or ""))
+    except ValueError:
+        raise ValueError(f"--scale {scale!r}: expected pixels, a number > 0, or 'adaptive'") from None
+
+
+def _problem(file: BundleFile, options: argparse.Namespace) -> BundleProblem:
+    """The file's problem with the freedom that was asked for."""
+    from dataclasses import replace
+
+    from vslam_ref.estimation.bundle import freedom
+    from vslam_ref.estimation.bundle.gauge import fix_gauge
+
+    problem = file.problem
+    if options.free is not None:
+        words = [word.strip() for word in options.free.split(",") if word.strip()]
+        names = () if words == ["none"] else tuple(words)
+        problem = replace(problem, free=freedom(problem.model, problem.scene, intrinsics=names))
+    return fix_gauge(problem) if options.gauge == "fixed" else problem
+
+
+class _Table:
+    """One line an iteration."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, step: Iteration) -> None:
+        if self.count == 0:
+            print(f"{'step':>4} {'cost':>16} {'decrease':>10} {'gradient':>9} {'damping':>8} {'gain':>7}")
+        self.count += 1
+        mark = "" if step.accepted else "  refused"
+        print(
+            f"{self.count:>4} {step.cost:>16.6f} {step.decrease:>10.3g} {step.gradient_norm:>9.2g} "
+            f"{step.damping:>8.1g} {step.gain:>7.3f}{mark}",
+            flush=True,
+        )
+
+
+def _numbers(result: BundleResult) -> dict[str, Any]:
+    views, points, seen = result.problem.sizes
+    return {
+        "cameras": views,
+        "points": points,
+        "observations": seen,
+        "initial_cost": result.initial_cost,
+        "final_cost": result.cost,
+        "iterations": result.iterations,
+        "reason": result.reason,
+        "rmse_px": result.rmse_px,
+        "sigma": result.sigma,
+        "set_aside": int(result.aside.sum()),
+    }
+
+
+def _show(numbers: dict[str, Any], result: BundleResult) -> None:
+    from vslam_ref.commands.tables import table
+
+    rows = [
+        ["cost at the start", f"{numbers['initial_cost']:.6f}"],
+        ["cost at the end", f"{numbers['final_cost']:.6f}"],
+        ["RMSE [px]", f"{numbers['rmse_px']:.6f}"],
+        ["iterations", str(numbers["iterations"])],
+        ["ended", f"{result.reason}: {result.message}"],
+        ["backend", numbers["backend"]],
+        ["seconds (CPU)", f"{numbers['seconds']:.3f} ({numbers['cpu_seconds']:.3f})"],
+    ]
+    if result.aside.any():
+        rows.append(["observations set aside", f"{numbers['set_aside']} without an image at the start"])
+    print(table(["what", "value"], rows))
+
+
+def _write(targets: dict[str, Path | None], file: BundleFile, result: BundleResult) -> None:
+    from dataclasses import replace
+
+    from vslam_ref.datasets.bundle_files import write_bundle, write_ply
+
+    after = replace(file, problem=result.problem)
+    if targets["ply"] is not None:
+        write_ply(targets["ply"], after)
+    if targets["out"] is not None:
+        write_bundle(targets["out"], after)
