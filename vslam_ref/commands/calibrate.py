@@ -17,7 +17,7 @@ HELP = "calibrate a camera from images of a checkerboard"
 EPILOG = """\
 The board is told by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners; images in
 which the whole board is not seen are named and left out. Take 10 or more images, with the board tilted by 30
-to 60 degrees in different directions, near and far, and into all corners of the image.
+to 45 degrees in different directions, near and far, and into all corners of the image.
 
 models:
   radtan    fx fy cx cy k1 k2 p1 p2 k3: radial and tangential (OpenCV, Kalibr, EuRoC); the default

@@ -193,5 +193,5 @@ def _flat(point: Point) -> str:
     return (
         "; all boards are nearly parallel to the image plane "
         f"(largest tilt {np.degrees(largest):.2g} degrees), "
-        "where a longer focal length looks like a greater distance: tilt the board by 30 to 60 degrees"
+        "where a longer focal length looks like a greater distance: tilt the board by 30 to 45 degrees"
     )
