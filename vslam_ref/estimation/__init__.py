@@ -6,5 +6,6 @@ room                          holds
 ``robust``                    losses that wrong matches cannot bend, and the scale they need
 ``least_squares``             Levenberg-Marquardt for small dense problems
 ``calibration``               a camera from images of a flat board
+``resection``                 one pose from points, with any lens and any loss
 ============================  =====================================================================
 """

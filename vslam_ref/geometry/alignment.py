@@ -95,6 +95,8 @@ def align(
 ) -> Alignment:
     """Find the motion (and, if asked, the scale) that brings ``source`` closest to ``target``.
 
+    Implements :eq:`eq-umeyama`.
+
     Parameters
     ----------
     source, target : array_like, shape (N, d)

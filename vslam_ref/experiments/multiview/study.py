@@ -110,6 +110,7 @@ def study_world(config: MultiviewConfig, filed: World) -> Study:
     world = moved(filed, shift)
     points = triangulate(world.views, world.uv, world.mask)
     consistent = pairwise_distance(world.views, world.uv, world.mask) <= config.gate_px
+    resected = _leave_each_out(config, world)
     return Study(
         config,
         world,
@@ -119,8 +120,8 @@ def study_world(config: MultiviewConfig, filed: World) -> Study:
         consistent,
         pair_medians(world),
         pair_medians(filed),
-        _leave_each_out(config, world),
-        _leave_each_out(config, filed),
+        resected,
+        _leave_each_out(config, filed) if shift.any() else resected,
     )
 
 

@@ -75,7 +75,7 @@ class ThreePointPoses(NamedTuple):
 def p3p(bearings: ArrayLike, X_world: ArrayLike) -> ThreePointPoses:
     """All poses from which three points are seen along three bearings.
 
-    Implements :eq:`eq-p3p-distances`, :eq:`eq-p3p-conics` and :eq:`eq-p3p-lines`.
+    Implements :eq:`eq-p3p-distances`.
 
     Parameters
     ----------
@@ -133,6 +133,31 @@ def _degenerate(b: Array, X: Array) -> list[str]:
     return [names[int(np.argmax(row))] if row.any() else "" for row in told]
 
 
+def conics(b: Array, X: Array) -> tuple[Array, Array]:
+    """D_1 and D_2, (N, 3, 3), of bearings and points (N, 3, 3): d^T D d = 0 for the distances d.
+
+    Implements :eq:`eq-p3p-conics`, with squared sides in units of their sum.
+    """
+    M, a = _matrices(b), _squared_sides(X)
+    a = (a / a.sum(axis=1, keepdims=True))[..., None, None]
+    return a[:, 2] * M[:, 0] - a[:, 0] * M[:, 2], a[:, 2] * M[:, 1] - a[:, 1] * M[:, 2]
+
+
+def lines_of_the_pencil(D1: Array, D2: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+    """Two lines (N, 2, 3) through the common points of two conics, whether real (N,), and a third conic.
+
+    Implements :eq:`eq-p3p-lines`.  The third conic (N, 3, 3) is the member that the lines are best met with.
+    """
+    A, B = _best_member(D1, D2)
+    lines, real = _lines(A, B)
+    return lines, real, A
+
+
+def _squared_sides(X: Array) -> Array:
+    """a_12, a_13, a_23, shape (N, 3)."""
+    return np.stack([np.sum((X[:, i] - X[:, j]) ** 2, axis=-1) for i, j in PAIRS], 1)
+
+
 def _matrices(b: Array) -> Array:
     """M_12, M_13, M_23, shape (N, 3, 3, 3)."""
     M = np.zeros((len(b), 3, 3, 3))
@@ -145,13 +170,10 @@ def _matrices(b: Array) -> Array:
 def _distances(b: Array, X: Array) -> tuple[Array, NDArray[np.bool_], Array]:
     """Distances (N, 4, 3), which of them are solutions, and their sharpness (N, 4)."""
     M = _matrices(b)
-    a = np.stack([np.sum((X[:, i] - X[:, j]) ** 2, axis=-1) for i, j in PAIRS], 1)  # (N, 3)
+    a = _squared_sides(X)
     size = a.sum(axis=1, keepdims=True)
     a = a / size
-    D1 = a[:, 2, None, None] * M[:, 0] - a[:, 0, None, None] * M[:, 2]
-    D2 = a[:, 2, None, None] * M[:, 1] - a[:, 1, None, None] * M[:, 2]
-    A, B = _best_member(D1, D2)
-    lines, real = _lines(A, B)
+    lines, real, A = lines_of_the_pencil(*conics(b, X))
     rays, meets = _meet(lines, A)  # (N, 4, 3), (N, 4)
     rays *= np.where(rays.sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
     total = np.einsum("nkij,nsi,nsj->ns", M, rays, rays)  # sum of the three equations
