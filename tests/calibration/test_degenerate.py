@@ -30,6 +30,13 @@ def test_boards_parallel_to_the_image_plane(sigma: float, model: str) -> None:
     assert found.covariance is None or found.std["fx"] > 0.05 * found.camera.fx
 
 
+def test_one_view_many_times_counts_as_one() -> None:
+    rng = np.random.default_rng(2)
+    T = simulated.poses(BOARD, CAMERA, SIZE, 1, rng, tilt=(0.5, 0.5))
+    found = calibrate(simulated.views(BOARD, CAMERA, np.repeat(T, 6, axis=0), 0.3, rng), SIZE)
+    assert "nearly parallel to each other, and count as one view" in found.undetermined
+
+
 def test_a_tilt_of_half_a_radian_determines_it() -> None:
     found = calibrate(flat_views(0.5, 0.3), SIZE)
     assert found.undetermined == ""

@@ -83,6 +83,8 @@ def test_files_and_folders(tmp_path: Path) -> None:
     assert image_files([tmp_path / "notes.txt", tmp_path / "b.png"])[0].name == "notes.txt"
     with pytest.raises(FormatError, match="no such file or folder"):
         image_files([tmp_path / "c.png"])
+    with pytest.raises(FormatError, match="an empty name"):
+        image_files([""])
     with pytest.raises(FormatError, match=r"no image in this folder; expected \.bmp"):
         image_files([tmp_path / "deeper.png"])
 
@@ -97,6 +99,47 @@ def test_images_that_cannot_be_read(tmp_path: Path) -> None:
             read_grey(path)
     cv2.imwrite(str(path), drawn())
     assert np.array_equal(read_grey(path), drawn())
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("a.png", "no image that can be read"), ("a.jpg", "the picture is cut off")]
+)
+def test_pictures_that_are_cut_off(
+    tmp_path: Path, name: str, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The decoder's own lines, which name no file, become part of the error and do not reach the terminal."""
+    path = tmp_path / name
+    cv2.imwrite(str(path), drawn())
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(FormatError, match=message) as told:
+        read_grey(path)
+    assert str(told.value).startswith(str(path))
+    assert "\n" not in str(told.value)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.bmp", "a.tif"])
+def test_damaged_bytes_end_in_an_image_or_in_one_line(
+    tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, rng = tmp_path / name, np.random.default_rng(0)
+    cv2.imwrite(str(path), drawn()[::4, ::4])
+    data, refused = path.read_bytes(), 0
+    for _ in range(100):
+        mutant = bytearray(data)
+        for at in rng.integers(0, min(len(data), 400), 3):
+            mutant[at] = rng.integers(256)
+        path.write_bytes(mutant[: rng.integers(len(data) // 2, len(data) + 1)])
+        try:
+            image = read_grey(path)
+        except FormatError as error:
+            refused += 1
+            assert "\n" not in str(error)
+        else:
+            assert image.ndim == 2
+    assert refused > 10
+    assert capfd.readouterr().err == ""
 
 
 def test_a_huge_picture_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

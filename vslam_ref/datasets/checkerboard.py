@@ -6,7 +6,11 @@ done by it.  Pixel (0, 0) is the centre of the top-left pixel, as everywhere her
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +24,8 @@ GreyImage = NDArray[np.uint8]
 
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
 MAX_PIXELS = 100_000_000
+CUT_OFF = "Premature end"
+"""What the JPEG decoder writes when it fills the rest of a picture with grey."""
 LEAST_CORNERS = 3
 """The detector takes no smaller board, in either direction."""
 SMALLEST_SIDE = 32
@@ -40,7 +46,10 @@ def image_files(names: Sequence[Path | str]) -> list[Path]:
         If a name is neither file nor folder, or a folder has no image.
     """
     found: list[Path] = []
-    for name in map(Path, names):
+    for word in names:
+        name = Path(word)
+        if not str(word):
+            raise FormatError(name, None, "an empty name; expected an image or a folder of images")
         if name.is_dir():
             inside = sorted(p for p in name.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file())
             if not inside:
@@ -61,25 +70,48 @@ def read_grey(path: Path | str) -> GreyImage:
     Raises
     ------
     FormatError
-        If the file is missing, no image, or larger than ``MAX_PIXELS``.
+        If the file is missing, no image, cut off, or larger than ``MAX_PIXELS``.
     """
     import cv2
 
     path = Path(path)
     if not path.is_file():
         raise FormatError(path, None, "no such file")
-    try:
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-    except cv2.error as error:  # more than 2^30 pixels
-        raise FormatError(path, None, f"image cannot be read ({' '.join(str(error.err).split())})") from None
+    with _complaints() as told:
+        try:
+            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+        except cv2.error as error:  # more than 2^30 pixels
+            image = None
+            told.append(str(error.err))
+    why = " ".join(" ".join(told).split())
     if image is None:
-        raise FormatError(path, None, f"no image that can be read; expected one of {', '.join(SUFFIXES)}")
+        right = f"expected one of {', '.join(SUFFIXES)}"
+        raise FormatError(path, None, f"no image that can be read{f' ({why})' if why else ''}; {right}")
+    if CUT_OFF in why:
+        raise FormatError(path, None, f"{why}: the picture is cut off; fetch it again")
     if image.size > MAX_PIXELS:
         raise FormatError(
             path, None, f"{image.shape[1]}x{image.shape[0]} pixels; at most {MAX_PIXELS} are read"
         )
     grey: GreyImage = image.astype(np.uint8, copy=False)
     return grey
+
+
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """Collect what the decoders write to the process's standard error: lines that name no file."""
+    told: list[str] = []
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as sink:
+        kept = os.dup(2)
+        try:
+            os.dup2(sink.fileno(), 2)
+            yield told
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            sink.seek(0)
+            told.append(sink.read(1000).decode("utf-8", "replace"))
 
 
 def find_corners(image: NDArray[Any], columns: int, rows: int) -> Array | None:

@@ -187,9 +187,13 @@ def _vague(point: Point, cov: Array) -> str:
 
 
 def _flat(point: Point) -> str:
-    largest = float(tilt(point.state.T_cam_board).max())
+    """Why the sensor is not determined, where the boards' directions tell."""
+    T = point.state.T_cam_board
+    largest = float(tilt(T).max())
     if largest > FLAT_TILT:
-        return ""
+        apart = np.arccos(np.clip(T[:, :3, 2] @ T[0, :3, 2], -1.0, 1.0))
+        alike = len(T) > 1 and float(apart.max()) < FLAT_TILT
+        return "; all boards are nearly parallel to each other, and count as one view" if alike else ""
     return (
         "; all boards are nearly parallel to the image plane "
         f"(largest tilt {np.degrees(largest):.2g} degrees), "
