@@ -131,13 +131,13 @@ def test_damaged_bytes_end_in_an_image_or_in_one_line(
         for at in rng.integers(0, min(len(data), 400), 3):
             mutant[at] = rng.integers(256)
         path.write_bytes(mutant[: rng.integers(len(data) // 2, len(data) + 1)])
+        told = ""
         try:
-            image = read_grey(path)
+            assert read_grey(path).ndim == 2
         except FormatError as error:
-            refused += 1
-            assert "\n" not in str(error)
-        else:
-            assert image.ndim == 2
+            told = str(error)
+        refused += bool(told)
+        assert "\n" not in told
     assert refused > 10
     assert capfd.readouterr().err == ""
 
