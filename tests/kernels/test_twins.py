@@ -171,10 +171,10 @@ def for_apply_plain(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     """All states; cells never seen, and long not seen; hits that settle; walls that reach 0 or 1 cell."""
     s, d = rng.uniform(-3, 3, (2, 2000))
-    seen, since = rng.choice([-np.inf, 7.0, 9.5], 2000), rng.choice([np.inf, 5.0, 9.0], 2000)
+    times = (rng.choice(t, 2000) for t in ([-np.inf, 7.0, 9.5], [-np.inf, 8.0, 9.5], [0.0, 5.0, 9.0]))
     steps = rng.uniform(-2, 2, (2, 3, 2))
-    limits = np.array([6.0, 3.0, rng.choice([-1.0, 1.0]), rng.choice([3.0, np.inf]), float(n % 2)])
-    return s, d, seen, since, 50, *for_grid(rng, B, n), *steps, limits, 10.0
+    limits = np.array([6.0, 3.0, rng.choice([-1.0, 1.0]), rng.choice([3.0, np.inf]), 1.0, n % 2])
+    return s, d, *times, 50, *for_grid(rng, B, n), *steps, limits, 10.0
 
 
 INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {

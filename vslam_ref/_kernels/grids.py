@@ -16,17 +16,9 @@ MAX_LENGTH = 16384
 UNSEEN, MISS, HIT, EXPLAINED = 0, 1, 2, 3
 FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 DECIDED_LOG_ODDS = np.log(0.9 / (1.0 - 0.9))
+TOO_LONG = "a beam is not finite or spans more than 16384 cells; take a coarser resolution"
+OUTSIDE = "a beam leaves the map, or comes within a cell of its border; grow the map first"
 LAYER = types.Array(types.float64, 1, "C")  # row by row: known to be contiguous, so loops become vector code
-
-
-@njit(cache=True)
-def _check(start, ends):
-    for i in range(ends.shape[0]):
-        for a in range(2):
-            if not abs(ends[i, a] - start[a]) <= MAX_LENGTH:
-                raise ValueError(
-                    "a beam is not finite or spans more than 16384 cells; take a coarser resolution"
-                )
 
 
 @njit(cache=True)
@@ -78,25 +70,30 @@ def _mark(flat, columns, start, ends, hit, low):
 
 
 @njit(cache=True)
-def _look(start, ends, hit):
+def _look(rows, columns, start, ends, hit):
     """(window, its first column and row)."""
+    for b in range(ends.shape[0]):
+        for a in range(2):
+            if not abs(ends[b, a] - start[a]) <= MAX_LENGTH:
+                raise ValueError(TOO_LONG)
     low, high = np.empty(2, np.int64), np.empty(2, np.int64)
     for a in range(2):
         least = most = start[a]
         for b in range(ends.shape[0]):
             least, most = min(least, ends[b, a]), max(most, ends[b, a])
         low[a], high[a] = np.int64(np.floor(least)) - 1, np.int64(np.floor(most)) + 2
-    columns, rows = high[0] - low[0], high[1] - low[1]
-    flat = np.zeros(rows * columns, np.uint8)
-    _mark(flat, columns, start, ends, hit, low)
-    return flat.reshape((rows, columns)), low
+    if low[0] < 0 or low[1] < 0 or high[0] > columns or high[1] > rows:
+        raise ValueError(OUTSIDE)
+    width, height = high[0] - low[0], high[1] - low[1]
+    flat = np.zeros(height * width, np.uint8)
+    _mark(flat, width, start, ends, hit, low)
+    return flat.reshape((height, width)), low
 
 
 @kernel(LAYER, types.int64, given(1), given(2), given(1, types.boolean), given(1), types.float64)
 def apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
     """Twin of :func:`vslam_ref.grids.plain.apply_plain`."""
-    _check(start, ends)
-    window, low = _look(start, ends, hit)
+    window, low = _look(log_odds.shape[0] // columns, columns, start, ends, hit)
     miss_adds, hit_adds = evidence[0], evidence[1]
     for r in range(window.shape[0]):
         first = (r + low[1]) * columns + low[0]
@@ -131,14 +128,14 @@ def _clipped(v, bound):
 
 
 @kernel(
-    LAYER, LAYER, LAYER, LAYER, types.int64, given(1), given(2), given(1, types.boolean),
+    LAYER, LAYER, LAYER, LAYER, LAYER, types.int64, given(1), given(2), given(1, types.boolean),
     given(2), given(2), given(1), types.float64,
 )  # fmt: skip
-def apply_scan(s, d, seen, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
+def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
     """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
-    _check(start, ends)
-    s_bound, d_bound, lifetime, settle, reach = limits[0], limits[1], limits[2], limits[3], int(limits[4])
-    window, low = _look(start, ends, hit)
+    s_bound, d_bound, lifetime, settle = limits[0], limits[1], limits[2], limits[3]
+    gap, reach = limits[4], int(limits[5])
+    window, low = _look(s.shape[0] // columns, columns, start, ends, hit)
     if reach > 0:  # before S changes
         for r in range(window.shape[0]):
             for c in range(window.shape[1]):
@@ -154,11 +151,13 @@ def apply_scan(s, d, seen, since, columns, start, ends, hit, steps_s, steps_d, l
             old = s[at]
             state = _state(old)
             is_hit = 1 if look >= HIT else 0
-            since[at] = min(since[at], now) if is_hit else np.inf
+            if is_hit:
+                since[at] = now if now - last_hit[at] > gap else since[at]
+                last_hit[at] = now
             if is_hit and state == FREE and now - since[at] >= settle:
                 old, state = 0.0, UNKNOWN
             prior = 0.0 if now - seen[at] > lifetime else d[at]
-            step = steps_d[OCCUPIED, 1] if look == EXPLAINED else steps_d[state, is_hit]
+            state = OCCUPIED if look == EXPLAINED else state
             s[at] = _clipped(old + steps_s[state, is_hit], s_bound)
-            d[at] = _clipped(prior + step, d_bound)
+            d[at] = _clipped(prior + steps_d[state, is_hit], d_bound)
             seen[at] = now

@@ -29,9 +29,10 @@ from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import LogOddsGrid
 from vslam_ref.grids.plain import PlainMap
 from vslam_ref.grids.scan import LaserScanner, Scan, ScanLike
-from vslam_ref.grids.static_dynamic import MapConfig, StaticDynamicMap
+from vslam_ref.grids.static_dynamic import AS_PRINTED, MapConfig, StaticDynamicMap
 
 __all__ = [
+    "AS_PRINTED",
     "InverseSensor",
     "LaserScanner",
     "Lattice",

@@ -35,7 +35,7 @@ class Steps(NamedTuple):
 
 
 def _value(value: float, reason: str) -> float:
-    return field(default=value, metadata={"reason": reason})  # type: ignore[no-any-return]
+    return field(default=value, metadata={"reason": reason})
 
 
 @dataclass(frozen=True)

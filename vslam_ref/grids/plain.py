@@ -72,8 +72,9 @@ def apply_plain(
     bound : float
         Largest log-odds.
     """
-    rows, places, window = look(start, ends, hit)
-    part = log_odds.reshape(-1, columns)[rows, places]
+    whole = log_odds.reshape(-1, columns)
+    rows, places, window = look(whole.shape, start, ends, hit)
+    part = whole[rows, places]
     hits = np.nonzero(window == HIT)
     part += (window == MISS) * evidence[0]
     part[hits] += evidence[1]

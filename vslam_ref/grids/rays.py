@@ -1,14 +1,14 @@
 """Every cell that a beam crosses, once, and without rounding.
 
 A cell is the half-open square [i, i+1) x [j, j+1).  A beam *crosses* it if a part of the beam of positive
-length lies in it.  Touching a corner is not crossing; running along an edge is crossing the cell that owns the
-edge.
+length lies in it.  Touching a corner is not crossing; running along an edge is crossing the cell that owns
+the edge.
 
 How it stays exact.  Ends of beams are rounded to 1/4096 of a cell (24 micrometres at 0.1 m).  Beyond that
 all numbers are integers held in floating point.  Where a beam crosses the k-th line between columns, its
-height is n/d with integers n and d; the quotient is rounded, but its floor and ceiling are those of n/d as long
-as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last place of m
-is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
+height is n/d with integers n and d; the quotient is rounded, but its floor and ceiling are those of n/d as
+long as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last
+place of m is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
 
 How it is done without sorting.  Each beam is mirrored to run to the right and upwards, and walked along
 the axis on which it is longer.  In one column it then crosses one cell or two: from the row at which it
@@ -33,6 +33,8 @@ GROUP = 64
 """Beams that are walked together."""
 UNSEEN, MISS, HIT = 0, 1, 2
 """What a scan says of a cell."""
+TOO_LONG = f"a beam is not finite or spans more than {MAX_LENGTH} cells; take a coarser resolution"
+OUTSIDE = "a beam leaves the map, or comes within a cell of its border; grow the map first"
 
 
 class Walks(NamedTuple):
@@ -65,9 +67,7 @@ def walks(start: ArrayLike, ends: ArrayLike) -> Walks:
     delta = np.rint(np.asarray(ends, np.float64).reshape(-1, 2) * QUANTA) - p
     d = np.abs(delta)
     if not (d <= MAX_LENGTH * QUANTA).all():
-        raise ValueError(
-            f"a beam is not finite or spans more than {MAX_LENGTH} cells; take a coarser resolution"
-        )
+        raise ValueError(TOO_LONG)
     signs = np.where(delta < 0, -1.0, 1.0)
     first = np.floor(signs * p / QUANTA)  # first cell of the mirrored beam
     inside = signs * p - first * QUANTA  # in [0, QUANTA)
@@ -217,10 +217,22 @@ class Look(NamedTuple):
     window: NDArray[np.uint8]
 
 
-def look(start: Array, ends: Array, hit: NDArray[np.bool_]) -> Look:
-    """Return what a scan says, in its bounding window; arguments as for :func:`mark_beams`."""
+def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool_]) -> Look:
+    """Return what a scan says of a map of ``shape`` (rows, columns), in its bounding window.
+
+    Other arguments as for :func:`mark_beams`.
+
+    Raises
+    ------
+    ValueError
+        As :func:`walks`, or if a beam comes within a cell of the map's border.
+    """
+    if not (np.abs(ends - start) <= MAX_LENGTH).all():
+        raise ValueError(TOO_LONG)
     low = np.floor(np.minimum(ends.min(axis=0), start)).astype(np.int64) - 1
     high = np.floor(np.maximum(ends.max(axis=0), start)).astype(np.int64) + 2
+    if (low < 0).any() or high[0] > shape[1] or high[1] > shape[0]:
+        raise ValueError(OUTSIDE)
     window = np.zeros((high[1] - low[1], high[0] - low[0]), dtype=np.uint8)
     mark_beams(window, start - low, ends - low, hit)
     return Look(slice(low[1], high[1]), slice(low[0], high[0]), window)

@@ -97,7 +97,7 @@ class LaserScanner:
     @property
     def angles(self) -> Array:
         """Directions (B,) in the laser's frame."""
-        return self.first_angle + self.step * np.arange(self.beams)
+        return self.first_angle + self.step * np.arange(self.beams, dtype=np.float64)
 
     def scan(self, ranges: Array, time: float) -> Scan:
         """Return the scan of ``ranges`` (B,) at ``time``.

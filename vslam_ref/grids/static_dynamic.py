@@ -1,7 +1,7 @@
 """Two maps of a world in which things move: S, what stays, and D, what is moving now.
 
-Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of a
-cell *before* the scan, and its log-odds are added.
+Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of
+a cell *before* the scan, and its log-odds are added.
 
     L(S_t) = L(S | o_t, S_{t-1}) + L(S_{t-1})                                                    (A4.2)
     L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                        (A4.3)
@@ -11,11 +11,14 @@ Three rules are added, each with a switch:
 
 * *lifetime*: a cell of D that was not looked at for ``d_lifetime`` seconds is unknown again.  D holds what is
   there now.
-* *explained hits*: a hit within ``explained_by`` cells of a decided static cell is that cell's: noise of the
-  range and of the pose makes walls no movers.  0 is the table as it stands.
-* *settling* (the ageing variant): what was hit at every look for ``settle_seconds`` on free floor has come to
-  stay.  S forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a
-  chair put down on once-free floor is dynamic for ever.
+* *explained hits*: a hit within ``explained_by`` cells of a decided static cell is taken for that cell's, in
+  both tables: noise of the range and of the pose makes walls no movers, and a wall that lost a cell gets
+  it back.  0 is the table as it stands: a cell of a wall that was free once is lost for ever.
+* *settling* (the ageing variant): what was hit again and again for ``settle_seconds`` on free floor, never
+  ``hit_gap`` seconds apart, has come to stay.  S forgets there that the floor was free, and takes it in.
+  ``None`` is the table as it stands: a chair put down on once-free floor is dynamic for ever.
+
+:data:`AS_PRINTED` has none of the last two.
 """
 
 from __future__ import annotations
@@ -60,11 +63,14 @@ class MapConfig:
         default=1, metadata={"reason": "range noise moves a wall by one cell", "unit": "cells"}
     )
     settle_seconds: float | None = field(
-        default=None,
-        metadata={"reason": "None is A's table; a number lets what stands still become static", "unit": "s"},
+        default=10.0, metadata={"reason": "people seldom stand as still as that; None: never", "unit": "s"}
     )
     d_lifetime: float = field(
         default=1.0, metadata={"reason": "at 1 m/s a person has left its cells by then", "unit": "s"}
+    )
+    hit_gap: float = field(
+        default=1.0,
+        metadata={"reason": "hits further apart are two visits; beams miss thin things", "unit": "s"},
     )
     s_most: float = field(default=0.999, metadata={"reason": "S changes its mind after six misses"})
     d_most: float = field(default=0.96, metadata={"reason": "D lets go at the first miss"})
@@ -90,6 +96,10 @@ class MapConfig:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must lie between {least:g} and 1")
 
 
+AS_PRINTED = MapConfig(explained_by=0, settle_seconds=None)
+"""The table of :mod:`inverse_sensor` and nothing else, but the lifetime of D."""
+
+
 class StaticDynamicMap(Canvas):
     """S and D, from one scan to the next.
 
@@ -99,8 +109,7 @@ class StaticDynamicMap(Canvas):
 
     Notes
     -----
-    Four numbers a cell: the log-odds of S and D, when the cell was last looked at, and since when every look
-    has been a hit.
+    Five numbers a cell: the log-odds of S and D, and three times.
 
     Examples
     --------
@@ -119,16 +128,30 @@ class StaticDynamicMap(Canvas):
 
     def __init__(self, config: MapConfig | None = None) -> None:
         self.config = c = MapConfig() if config is None else config
-        fills = {"static": 0.0, "dynamic": 0.0, "seen": -math.inf, "since": math.inf}
+        fills = {"static": 0.0, "dynamic": 0.0, "seen": -math.inf, "last_hit": -math.inf, "since": 0.0}
         super().__init__(c.resolution, c.usable_range, c.no_return, fills)
         self._steps = c.sensor.steps(c.d_high_where)
         self._limits = limits(c)
 
     def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
-        layers = (self.layers[name].reshape(-1) for name in ("static", "dynamic", "seen", "since"))
+        s, d, seen, last_hit, since = (layer.reshape(-1) for layer in self.layers.values())
         steps = self._steps
         columns = self.lattice.shape[1]
-        apply_scan(*layers, columns, start, ends, hit, steps.static, steps.dynamic, self._limits, self.time)
+        apply_scan(
+            s,
+            d,
+            seen,
+            last_hit,
+            since,
+            columns,
+            start,
+            ends,
+            hit,
+            steps.static,
+            steps.dynamic,
+            self._limits,
+            self.time,
+        )
 
     def static(self) -> LogOddsGrid:
         """Return S, a view that later scans change."""
@@ -157,7 +180,7 @@ def limits(config: MapConfig) -> Array:
     bounds = log_odds([config.s_most, config.d_most])
     lifetime = config.d_lifetime if config.d_memory == "formula" else -1.0
     settle = math.inf if config.settle_seconds is None else config.settle_seconds
-    return np.array([*bounds, lifetime, settle, float(config.explained_by)])
+    return np.array([*bounds, lifetime, settle, config.hit_gap, float(config.explained_by)])
 
 
 @accelerated("grids:apply_scan")
@@ -165,6 +188,7 @@ def apply_scan(
     s: Array,
     d: Array,
     seen: Array,
+    last_hit: Array,
     since: Array,
     columns: int,
     start: Array,
@@ -183,8 +207,8 @@ def apply_scan(
     ----------
     s, d : ndarray, shape (rows * columns,)
         Log-odds, row by row.
-    seen, since : ndarray, shape (rows * columns,)
-        Times: of the last look; from which on every look was a hit (inf after a miss).
+    seen, last_hit, since : ndarray, shape (rows * columns,)
+        Times: of the last look, of the last hit, and of the first hit of the run that it belongs to.
     columns : int
         Cells in a row.
     start : ndarray, shape (2,)
@@ -195,27 +219,28 @@ def apply_scan(
         Whether something is there.
     steps_s, steps_d : ndarray, shape (3, 2)
         From :meth:`InverseSensor.steps`.
-    limits : ndarray, shape (5,)
+    limits : ndarray, shape (6,)
         From :func:`limits`.
     now : float
         Time, later than before.
     """
-    s_bound, d_bound, lifetime, settle, reach = limits.tolist()
-    rows, places, window = rays.look(start, ends, hit)
+    s_bound, d_bound, lifetime, settle, gap, reach = limits.tolist()
+    whole = [layer.reshape(-1, columns) for layer in (s, d, seen, last_hit, since)]
+    rows, places, window = rays.look(whole[0].shape, start, ends, hit)
     missed, hits = window == rays.MISS, np.nonzero(window == rays.HIT)
-    whole = [layer.reshape(-1, columns) for layer in (s, d, seen, since)]
     explained = _near_static(whole[0], hits[0] + rows.start, hits[1] + places.start, int(reach))
-    s, d, seen, since = (layer[rows, places] for layer in whole)  # views
+    s, d, seen, last_hit, since = (layer[rows, places] for layer in whole)  # views
 
-    # S_{t-1} in the cells that were hit, after settling
-    s_hit, began = s[hits], np.minimum(since[hits], now)
+    # S_{t-1} in the cells that were hit
+    s_hit = s[hits]
+    began = np.where(now - last_hit[hits] > gap, now, since[hits])
     settled = (states(s_hit) == FREE) & (now - began >= settle)
     s_hit[settled] = 0.0
-    state = states(s_hit)
+    state = np.where(explained, OCCUPIED, states(s_hit))
 
     stale = (now - seen > lifetime) & (window != rays.UNSEEN)
     d[stale] = 0.0
-    d_hit = d[hits] + np.where(explained, steps_d[OCCUPIED, 1], steps_d[state, 1])
+    d_hit = d[hits] + steps_d[state, 1]
 
     d += missed * _of_state(s, steps_d[:, 0])
     s += missed * _of_state(s, steps_s[:, 0])
@@ -223,14 +248,14 @@ def apply_scan(
     np.clip(s, -s_bound, s_bound, out=s)
     np.clip(d, -d_bound, d_bound, out=d)
     seen[window != rays.UNSEEN] = now
-    since[missed] = np.inf
-    since[hits] = began
+    since[hits], last_hit[hits] = began, now
 
 
 def _of_state(s: Array, values: Array) -> Array:
     """Pick one of three values by the state of every cell."""
     undecided = np.where(s < -DECIDED_LOG_ODDS, values[FREE], values[UNKNOWN])
-    return np.where(s > DECIDED_LOG_ODDS, values[OCCUPIED], undecided)
+    picked: Array = np.where(s > DECIDED_LOG_ODDS, values[OCCUPIED], undecided)
+    return picked
 
 
 def _near_static(s: Array, row: IntArray, column: IntArray, reach: int) -> NDArray[np.bool_]:
