@@ -54,7 +54,8 @@ test-slow: $(call DONE,fast) $(call DONE,test)
 
 bench: $(call DONE,fast) $(call DONE,test)
 	@mkdir -p $(OUT)
-	$(BIN)/vslam-ref bench filters --json $(OUT)/bench-filters.json
+	-$(PY) -m pip install --quiet --disable-pip-version-check --editable ".[peers]"
+	$(BIN)/vslam-ref bench --json $(OUT)/bench.json
 
 grade: $(call DONE,fast) $(call DONE,test)
 	@test -n "$(EXERCISE)" && test -n "$(FILE)" || { echo "say: make grade EXERCISE=16_name FILE=mine.py" >&2; exit 2; }
