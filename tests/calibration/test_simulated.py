@@ -76,13 +76,13 @@ def test_exact_corners_give_the_camera_back(name: str) -> None:
 
 
 def test_covariance_is_honest() -> None:
-    """100 calibrations with new noise: the sum of their NEES is chi^2 with 900 degrees of freedom to first
+    """60 calibrations with new noise: the sum of their NEES is chi^2 with 540 degrees of freedom to first
     order in the noise; the band misses by chance once in 1e4.
     """
     camera = CAMERAS["radtan"]
     T, rng = scene(camera, views=8)
     start = Start(camera, T, 0.0)
-    total, runs = 0.0, 100
+    total, runs = 0.0, 60
     for _ in range(runs):
         found = calibrate(simulated.views(BOARD, camera, T, 0.3, rng), SIZE, start=start)
         assert found.covariance is not None

@@ -100,9 +100,7 @@ def test_the_camera_is_the_one_that_drew_the_pictures(folder: Path, tmp_path: Pa
     target = tmp_path / "numbers.json"
     assert run(folder, "--board", "6x4", "--json", target) == 0
     numbers = json.loads(target.read_text())
-    assert (
-        numbers["rms_px"] < 0.2
-    )  # two samples a pixel place an edge to 0.5 / sqrt(12) = 0.14 px, in u and v
+    assert numbers["rms_px"] < 0.2  # two samples a pixel place an edge to 0.5 / sqrt(12) = 0.14 px
     for name, value in zip(TRUTH.names(), TRUTH.params, strict=True):
         assert abs(numbers["parameters"][name] - value) < 5 * numbers["std"][name], name
 

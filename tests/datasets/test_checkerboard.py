@@ -19,8 +19,8 @@ H_IMAGE_BOARD = np.array([[40.0, 6.0, 110.0], [-3.0, 42.0, 120.0], [0.004, 0.012
 
 
 @lru_cache
-def drawn(columns: int = 7, rows: int = 5, oversampling: int = 6) -> np.ndarray:
-    """A board as a camera with square pixels sees it: each pixel the mean of 36 points of its area."""
+def drawn(columns: int = 7, rows: int = 5, oversampling: int = 4) -> np.ndarray:
+    """A board as a camera with square pixels sees it: each pixel the mean of 16 points of its area."""
     n = oversampling
     sub = (np.arange(n) + 0.5) / n - 0.5
     v, u = np.meshgrid(
