@@ -1,0 +1,86 @@
+"""Bundle adjustment drawn: losses under wrong observations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+from numpy.typing import NDArray
+
+from vslam_ref.plot import style
+
+Array = NDArray[np.float64]
+
+LOSS_LOOKS: dict[str, style.Look] = {
+    "l2": style.Look("least squares", style.GREY, ":"),
+    "huber": style.Look("Huber, σ known", style.GREEN, "-."),
+    "tukey": style.Look("Tukey, σ known", style.BLUE, "--"),
+    "adaptive": style.Look("Tukey, σ found", style.VERMILION, "-"),
+    "ptam": style.Look("Tukey, PTAM's constants", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
+}
+
+
+def robust_figure(
+    shares: Array,
+    methods: Sequence[str],
+    centre: Array,
+    point: Array,
+    broken: Array,
+    *,
+    limit: float,
+    runs: int,
+) -> Figure:
+    """Draw errors of centres and points, and the share of broken scenes, against wrong observations.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (s,)
+        Share of wrong observations.
+    methods : sequence of m str
+        Names in ``LOSS_LOOKS``.
+    centre, point : ndarray, shape (3, m, s)
+        Lower quartile, median and upper quartile over the scenes, millimetres.
+    broken : ndarray, shape (m, s)
+        Share of the scenes.
+    limit : float
+        Error of the centres from which a scene is broken, millimetres.
+    runs : int
+        Number of scenes.
+    """
+    with style.house_style():
+        figure, panels = style.new_figure(4.2, 3)
+        for axes, values in zip(panels, (centre, point, None), strict=True):
+            for k, method in enumerate(methods):
+                look = LOSS_LOOKS[method]
+                line = 100 * broken[k] if values is None else values[1, k]
+                axes.plot(
+                    100 * shares,
+                    line,
+                    color=look.colour,
+                    ls=look.line,
+                    marker="o",
+                    ms=3.5,
+                    lw=2,
+                    label=look.name,
+                )
+                if values is not None:
+                    axes.fill_between(
+                        100 * shares, values[0, k], values[2, k], color=look.colour, alpha=0.13, lw=0
+                    )
+            axes.set_xlabel("wrong observations [%]")
+            axes.axvline(50, color=style.GREY, lw=1, ls=(0, (2, 2)))
+        for axes in panels[:2]:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_formatter(ScalarFormatter())
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        panels[0].axhline(limit, color=style.BLACK, lw=1)
+        panels[0].annotate("broken above", (0, limit), xytext=(0, 4), textcoords="offset points", fontsize=9)
+        panels[0].set(title=f"camera centres, {runs} scenes", ylabel="RMSE, median and quartiles [mm]")
+        panels[1].set(title="points", ylabel="RMSE, median and quartiles [mm]")
+        panels[2].set(title="broken scenes", ylabel="scenes [%]", ylim=(-4, 104))
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(methods), frameon=False)
+    return figure
