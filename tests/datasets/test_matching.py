@@ -67,7 +67,7 @@ def test_the_two_rules() -> None:
     assert matching.match(two, b, ratio=1.0).tolist() == [[1, 0]]
     # two descriptors of one place do not compete
     same = features([0.0, 0.0], [0.0, 1.0], [100.0, 0.0], place=[0, 0, 1])
-    assert matching.match(features([0.0, 0.4], [100.0, 2.0]), same).tolist() == [[0, 0], [1, 1]]
+    assert matching.match(features([0.0, 0.45], [100.0, 2.0]), same).tolist() == [[0, 0], [1, 1]]
     with pytest.raises(ValueError, match=r"ratio=0: must lie in \(0, 1\]"):
         matching.match(one, b, ratio=0)
 

@@ -11,7 +11,13 @@ from vslam_ref.datasets import catalogue
 from vslam_ref.experiments import multiview_fig1_1 as experiment
 from vslam_ref.experiments.framework import InputError, Result, RunContext, load
 from vslam_ref.experiments.multiview.scene import MultiviewConfig, World, simulated
-from vslam_ref.experiments.multiview.study import Study, study_world
+from vslam_ref.experiments.multiview.study import (
+    Study,
+    exchange,
+    pairwise_distance,
+    points_of_the_others,
+    study_world,
+)
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview import Views
 
@@ -70,6 +76,32 @@ def test_a_world_turned_inside_out_is_noticed(world: World) -> None:
     mirrored = study_world(CONFIG, world._replace(views=Views(world.views.cameras, T)))
     assert FRONT in failing(mirrored)
     assert LINES not in failing(mirrored)
+
+
+def test_a_left_out_picture_has_no_part_in_its_points(world: World) -> None:
+    """Its pixels are replaced by nonsense: the points stay, to the bit, and only its own pixels differ."""
+    v = 3
+    X, seen = points_of_the_others(CONFIG, world, v)
+    spoilt = world.uv.copy()
+    spoilt[:, v] += 100.0
+    Y, moved = points_of_the_others(CONFIG, world._replace(uv=spoilt), v)
+    assert len(X) > 30
+    np.testing.assert_array_equal(X, Y)
+    np.testing.assert_allclose(moved, seen + 100.0)
+
+
+def test_a_wrong_match_is_seen_by_its_pairs_and_pixels_are_exchanged_as_said(world: World) -> None:
+    three = np.flatnonzero(world.mask.sum(axis=1) >= 3)
+    distance = pairwise_distance(world.views, world.uv, world.mask)
+    good = three[distance[three] < CONFIG.gate_px][:20]
+    uv = world.uv.copy()
+    first = world.mask[good].argmax(axis=1)
+    uv[good, first] += [30.0, 40.0]
+    assert (pairwise_distance(world.views, uv, world.mask)[good] > CONFIG.gate_px).mean() > 0.9
+    pixels = np.arange(80.0).reshape(40, 2)
+    wrong = exchange(pixels, 0.2, np.random.default_rng(0))
+    assert (wrong != pixels).any(axis=1).sum() == 8
+    assert sorted(wrong[:, 0].tolist()) == pixels[:, 0].tolist()
 
 
 def with_record(study: Study, **changes: object) -> Study:

@@ -111,6 +111,21 @@ def test_the_refined_pose_is_scipys(lens: Camera) -> None:
     assert found.solution.cost <= theirs.cost * (1 + 1e-12)
 
 
+def test_without_noise_opencvs_linear_method_has_the_same_pose() -> None:
+    cv2 = pytest.importorskip("cv2")
+    rng = np.random.default_rng(13)
+    for _ in range(10):
+        _, X, X_cam = box(12, rng)
+        done, rotation, t = cv2.solvePnP(
+            X, LENS.project(X_cam).uv, LENS.matrix, None, flags=cv2.SOLVEPNP_EPNP
+        )
+        found = resect_linear(unit(X_cam), X)
+        assert done
+        # EPnP works with normal equations: half of the digits
+        np.testing.assert_allclose(found.T_cam_world[:3, :3], cv2.Rodrigues(rotation)[0], atol=1e-6)
+        np.testing.assert_allclose(found.T_cam_world[:3, 3], t.ravel(), atol=1e-5)
+
+
 def test_opencv_ends_at_the_same_pose() -> None:
     cv2 = pytest.importorskip("cv2")
     rng = np.random.default_rng(3)

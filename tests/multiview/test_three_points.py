@@ -77,6 +77,17 @@ def test_the_pose_that_made_the_picture_is_among_the_answers() -> None:
     assert set(found.reason) == {""}
 
 
+def test_narrow_views_lose_digits_and_not_answers() -> None:
+    """All within 0.01 radians: 1e-16 / 0.01^2 in the equations, over a sharpness of 1e-2 and less."""
+    rng = np.random.default_rng(9)
+    T = se3.random(rng, (1000,))
+    X_cam = np.array([0.0, 0.0, 1.0]) + 0.01 * rng.uniform(-1, 1, (1000, 3, 3))
+    found = p3p(unit(X_cam), se3.act(se3.inverse(T)[:, None], X_cam))
+    error = np.where(found.valid, np.abs(found.T_cam_world - T[:, None]).max(axis=(2, 3)), np.inf).min(axis=1)
+    assert np.median(error) < 1e-10
+    assert error.max() < 1e-4
+
+
 def test_every_answer_is_one() -> None:
     b, X, _ = problems(2000, 1)
     found = p3p(b, X)

@@ -4,7 +4,10 @@ The file ``*_par.txt`` says in its first line how many pictures there are, and i
 
     name.png  k11 k12 k13 k21 k22 k23 k31 k32 k33  r11 ... r33  t1 t2 t3
 
-The projection is K [R t], so R and t are ``T_cam_world``; x is to the right, y down.
+The projection is K [R t], so R and t are ``T_cam_world``; x is to the right, y down.  The note that comes
+with the data does not say where in a pixel its position is.  Numbers are returned as filed; the temple's
+pictures fit them better with (0.27, -0.82) px added to all pixels, as views that hang upside down tell
+(:func:`vslam_ref.experiments.multiview.study.principal_offset`).
 """
 
 from __future__ import annotations

@@ -62,7 +62,8 @@ def midpoint_with_jacobians(p_a: ArrayLike, b_a: ArrayLike, p_b: ArrayLike, b_b:
 
     Implements :eq:`eq-midpoint-jacobian`.
     From A X = sum P p, a change of P moves X by A^-1 dP w with w = p - X, and dP = -(db b^T + b db^T):
-    dX/db = -A^-1 ((b.w) I + b w^T).  The direction is normalised first: (I - b b^T)/|b|.
+    dX/db = -A^-1 ((b.w) I + b w^T).  The direction is normalised first: another factor,
+    (I - b b^T) over its length.
     """
     centres = [as_array("p_a", p_a, 3), as_array("p_b", p_b, 3)]
     lengths, units = [], []

@@ -93,6 +93,11 @@ def p3p(bearings: ArrayLike, X_world: ArrayLike) -> ThreePointPoses:
     ValueError
         If shapes do not fit, a number is not finite, or a bearing has not length 1.
 
+    Notes
+    -----
+    Cosines of small angles lose digits: where all three bearings lie within beta radians, an error of some
+    1e-16 / beta^2 enters.  Of random problems within 0.01 none is lost, within 0.001 about 2 %.
+
     Examples
     --------
     >>> X = np.array([[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 2.0, 6.0]])
