@@ -5,16 +5,17 @@ One message a line, its name first; ``#`` begins a comment.  Read are the scans 
     FLASER n r_1 ... r_n  x y theta  odom_x odom_y odom_theta  ipc_time host logger_time
 
 ``r_i`` are metres, from right to left over a half circle.  (x, y, theta) is the pose of the laser and
-(odom_x, ...) that of the robot; in *corrected* logs both are what scan matching found.  Other messages (``ODOM``,
-``PARAM``, ``NEFF``, ...) are counted and left alone.
+(odom_x, ...) that of the robot; in *corrected* logs both are what scan matching found.  Other messages
+(``ODOM``, ``PARAM``, ``NEFF``, ...) are counted and left alone.
 
 What the format leaves open, and what is taken here:
 
-* *Where the beams look.*  The lasers of these logs have steps of a whole or a half degree and begin at -90 degrees:
-  181 and 361 beams span the half circle with both ends, 180 and 360 lack the last.  Hence the step is 180 degrees
-  over n for even n, over n - 1 for odd n.
-* *When nothing came back.*  The scanners send 81.91, 81.83, 51.15 or 50 m then, by make and driver.  Readings of
-  50 m (:data:`MAX_RANGE`) and more count as "no return"; no wall of a building is seen from there.
+* *Where the beams look.*  The lasers of these logs have steps of a whole or a half degree and begin at -90
+  degrees: 181 and 361 beams span the half circle with both ends, 180 and 360 lack one.  Hence the step
+  is 180 degrees over n for even n, over n - 1 for odd n.  (On intel, aces and fhw every other choice blurs the
+  map.)
+* *When nothing came back.*  The scanners send 81.91, 81.83, 51.15 or 50 m then, by make and driver.  Readings
+  of 50 m (:data:`MAX_RANGE`) and more count as "no return"; no wall of a building is seen from there.
 * *Time.*  ``ipc_time``, as it is.  Stamps that run backwards or stand still are counted, and never refused.
 * *Readings* may be zero, negative, ``nan`` or ``inf``: the maps count them.  Poses and times must be finite.
 """
@@ -143,8 +144,8 @@ def _beams(path: Path, line: int, words: list[str]) -> int:
         raise FormatError(path, line, f"{beams} beams; expected between 1 and {MAX_BEAMS}")
     expected = 2 + beams + len(TAIL)
     if len(words) != expected:
-        what = f"{len(words)} words; expected {expected}: {SCAN}, {beams}, as many readings, {', '.join(TAIL)}"
-        raise FormatError(path, line, what)
+        right = f"expected {expected}: {SCAN}, {beams}, as many readings, {', '.join(TAIL)}"
+        raise FormatError(path, line, f"{len(words)} words; {right}")
     return beams
 
 

@@ -58,7 +58,7 @@ class InverseSensor:
     d_high: float = _value(
         0.95, "one hit decides a cell of D (0.95 > 0.9): a thing that moves is there once only"
     )
-    d_low: float = _value(0.1, "a hit that S explains: probably nothing moves there")
+    d_low: float = _value(0.05, "a hit that S explains says as much as a miss: nothing moves there")
     d_miss: float = _value(0.05, "one miss takes a decided cell of D back (0.95 -> 0.5): it has left")
 
     def __post_init__(self) -> None:

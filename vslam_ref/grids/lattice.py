@@ -97,7 +97,10 @@ class Lattice:
         ValueError
             If a point is not finite.
         """
-        at = np.floor(self.lattice_from_world(xy_world))
+        # whole cells first, then the corner: a point just below a line must not be rounded across it
+        at = np.floor(np.asarray(xy_world, np.float64) / self.resolution) - np.asarray(
+            self.corner, np.float64
+        )
         if not np.isfinite(at).all():
             raise ValueError("points must be finite to lie in a cell")
         cells: IntArray = at[..., ::-1].astype(np.int64)

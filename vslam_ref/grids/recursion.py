@@ -16,11 +16,14 @@ reading        L(S_t | S_{t-1})          L(S_t | o_1..t-1, S_{t-1})     what is 
 
 And the first term can be read in two ways:
 
-* ``conditioned``, as it is written: the probability of S_t given the observation *and* S_{t-1}.  It holds the old
-  odds already: L(S_{t-1}) + e, where e is the log-likelihood ratio of the observation.
+* ``conditioned``, as it is written: the probability of S_t given the observation *and* S_{t-1}.  It holds the
+  old odds already: L(S_{t-1}) + e, where e is the log-likelihood ratio of the observation.
 * ``evidence``: e alone, as if S_{t-1} were 0.5.
 
-What is right when the cell does not change is known: L(S_{t-1}) + e.  Two of the six combinations give it.
+What is right when the cell does not change is known: L(S_{t-1}) + e.  Three of the six combinations give it:
+``conditioned`` with either of the readings that say one thing (the table alone, nothing multiplied to it), and
+``printed`` with ``evidence``: the formula as it is, its table read as a likelihood ratio.  The maps of this room do
+the last.
 """
 
 from __future__ import annotations

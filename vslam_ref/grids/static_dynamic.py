@@ -55,7 +55,9 @@ class MapConfig:
         default="ignore", metadata={"reason": "glass and black things send nothing back, either"}
     )
     sensor: InverseSensor = field(default_factory=InverseSensor, metadata={"reason": "see there"})
-    d_memory: Memory = field(default="formula", metadata={"reason": "A4.3; 'text' is what A says beside it"})
+    d_memory: Memory = field(
+        default="text", metadata={"reason": "with A4.3's memory a walker has left before D believes it"}
+    )
     d_high_where: Where = field(
         default="free", metadata={"reason": "what moves shows itself where S was free; 'unknown' is A's text"}
     )
@@ -89,8 +91,9 @@ class MapConfig:
             raise ValueError(f"explained_by={self.explained_by!r} cells: must be between 0 and 10")
         if self.settle_seconds is not None and not self.settle_seconds > 0:
             raise ValueError(f"settle_seconds={self.settle_seconds!r}: must be positive, or None for never")
-        if not self.d_lifetime > 0:
-            raise ValueError(f"d_lifetime={self.d_lifetime!r} s: must be positive")
+        for name in ("d_lifetime", "hit_gap"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name}={getattr(self, name)!r} s: must be positive")
         for name, least in (("s_most", 0.9), ("d_most", 0.9)):
             if not least < getattr(self, name) < 1:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must lie between {least:g} and 1")
@@ -123,7 +126,7 @@ class StaticDynamicMap(Canvas):
     >>> grid.static().at([[3.05, 0.05], [2.05, 0.05]]).round(1)
     array([ 5.5, -4.2])
     >>> grid.dynamic().at([[3.05, 0.05], [2.05, 0.05]]).round(1)
-    array([-3.2, -0.2])
+    array([0. , 2.9])
     """
 
     def __init__(self, config: MapConfig | None = None) -> None:
