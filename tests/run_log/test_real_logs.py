@@ -74,9 +74,8 @@ class WrongMotionSign(EkfSlam):
 class WrongMeasurementSign(EkfSlam):
     """H with the wrong sign in its heading column."""
 
-    def _update_known(self, ids: Any, z: Any, cov_z: Any) -> Innovation:
+    def _update_known(self, ids: Any, columns: Any, z: Any, cov_z: Any) -> Innovation:
         b = self.blocks
-        columns = b.columns(ids)
         landmarks = np.stack([b.x_m[:, columns], b.x_m[:, columns + 1]], -1)
         H = observation.vehicle_from_world_with_jacobians(b.x_p[:, None], landmarks)
         J_pose = H.J_pose.copy()

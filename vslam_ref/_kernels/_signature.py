@@ -1,10 +1,12 @@
 """How a kernel is compiled: one signature, for arrays of any strides, its machine code kept on disk.
 
-One signature means no second compilation when a map is full or a run alone.  A kernel's module is imported
-at its first call, so that is when the cache is read.
+One signature means no second compilation when a map is full or a run alone.  A kernel is compiled, or read
+from the cache, at its own first call and not with its module: a program waits for what it uses only.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from numba import njit, types
 
@@ -25,5 +27,19 @@ def made(ndim):
 
 
 def kernel(*arguments, returns=types.void):
-    """Compile for one signature and keep the machine code on disk."""
-    return njit(returns(*arguments), cache=True)
+    """Declare a kernel with one signature, to be compiled by :func:`compiled`."""
+
+    def declare(function):
+        dispatcher: Any = njit(cache=True)(function)
+        dispatcher.signature = returns(*arguments)
+        return dispatcher
+
+    return declare
+
+
+def compiled(dispatcher):
+    """Compile a kernel for its signature, or read it from the cache, and for no other."""
+    if not dispatcher.signatures:
+        dispatcher.compile(dispatcher.signature)
+        dispatcher.disable_compile()
+    return dispatcher

@@ -5,146 +5,283 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
+from vslam_ref._kernels._blocks import (
+    TILE,
+    check_rows,
+    gain,
+    in_one_piece,
+    load_landmarks,
+    load_tile,
+    shrink_rows,
+    whiten,
+)
 from vslam_ref._kernels._signature import changed, given, kernel
 
 
 @njit(cache=True)
-def _step_rows(v, ds, m):
-    """Apply the pose transition to (x, y, sin, cos), the first four of v, in place."""
+def _step_rows(v, D, e):
+    """P <- p + D h, h <- e h for (x, y, sin, cos), the first four of v, in place."""
     s, c = v[2], v[3]
-    v[0] += ds * c
-    v[1] += ds * s
-    v[2] = m.real * s - m.imag * c
-    v[3] = m.imag * s + m.real * c
+    v[0] += D.real * c - D.imag * s
+    v[1] += D.imag * c + D.real * s
+    v[2] = e.imag * c + e.real * s
+    v[3] = e.real * c - e.imag * s
 
 
-@kernel(changed(2), changed(3), changed(2, types.complex128), given(2), given(3))
+@njit(cache=True)
+def _move(x, P, frame, D, e):
+    """Take the pose, the rows and columns of P (8, 8) and what waits in the frame along."""
+    _step_rows(x, D, e)
+    for j in range(8):
+        _step_rows(P[:, j], D, e)
+    for i in range(8):
+        _step_rows(P[i], D, e)
+    frame[2] += D * frame[3]
+    frame[3] *= e
+
+
+@njit(cache=True)
+def _add_control_noise(G, cov, N):
+    """Lower triangle of N (8, 8) += G cov G^T."""
+    r = cov.shape[0]
+    for i in range(8):
+        for q in range(r):
+            v = 0.0
+            for t in range(r):
+                v += G[i, t] * cov[t, q]
+            if v != 0.0:
+                for j in range(i + 1):
+                    N[i, j] += v * G[j, q]
+
+
+@njit(cache=True)
+def _add_symmetric(N, P):
+    """P += N, given by its lower triangle; N starts afresh."""
+    for i in range(8):
+        for j in range(i):
+            P[i, j] += N[i, j]
+            P[j, i] += N[i, j]
+        P[i, i] += N[i, i]
+    N[:] = 0.0
+
+
+@njit(cache=True)
+def _inverse(c):
+    """1 / c for a number near the unit circle, without the care that division takes."""
+    return c.conjugate() / (c.real * c.real + c.imag * c.imag)
+
+
+@njit(cache=True)
+def _put(G, row, column, value):
+    """A complex noise of a real number into the two rows of a complex state."""
+    G[row, column], G[row + 1, column] = value.real, value.imag
+
+
+@kernel(changed(2), changed(3), changed(2, types.complex128), given(3), given(4))
 def reduced_predict(x_p, P_a, frame, control, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced.reduced_predict`."""
-    J = np.empty((8, 5))  # rows: x, y, sin, cos, Re A, Im A, Re g, Im g
-    C = np.empty((8, 5))
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict`, control by control."""
+    G, N = np.zeros((8, 5)), np.zeros((8, 8))  # rows: x, y, sin, cos, Re A, Im A, Re g, Im g
     for b in range(x_p.shape[0]):
-        ds = control[b, 0]
-        m = complex(control[b, 1], control[b, 2])
-        t = complex(control[b, 3], control[b, 4])
-        s, c = x_p[b, 2], x_p[b, 3]
-        tau = frame[b, 1]
-        turned = m * frame[b, 0]
-        A, g, u = 1.0 / m, -tau / turned, -1.0 / turned
-        J[:] = 0.0
-        J[0, 0], J[1, 0] = c, s
-        J[2, 1], J[2, 2] = s, -c
-        J[3, 1], J[3, 2] = c, s
-        J[4, 1], J[4, 2] = A.real, -A.imag
-        J[5, 1], J[5, 2] = A.imag, A.real
-        J[6, 1], J[6, 2], J[6, 3], J[6, 4] = g.real, -g.imag, u.real, -u.imag
-        J[7, 1], J[7, 2], J[7, 3], J[7, 4] = g.imag, g.real, u.imag, u.real
-        for i in range(8):
-            for j in range(5):
-                v = 0.0
-                for q in range(5):
-                    v += J[i, q] * cov[b, q, j]
-                C[i, j] = v
-        P = P_a[b]
-        _step_rows(x_p[b], ds, m)
-        for j in range(8):
-            _step_rows(P[:, j], ds, m)
-        for i in range(8):
-            _step_rows(P[i], ds, m)
-        for i in range(8):
-            for j in range(i + 1):
-                v = 0.0
-                for q in range(5):
-                    v += C[i, q] * J[j, q]
-                P[i, j] += v
-                if j < i:
-                    P[j, i] += v
-        frame[b, 0] = turned
-        frame[b, 1] = m * tau + t
-        frame[b, 2] += ds * frame[b, 3]
-        frame[b, 3] *= complex(m.real, -m.imag)
+        h, D, e = complex(x_p[b, 3], x_p[b, 2]), complex(0.0, 0.0), complex(1.0, 0.0)
+        for k in range(control.shape[1]):
+            ds = control[b, k, 0]
+            m = complex(control[b, k, 1], control[b, k, 2])
+            t = complex(control[b, k, 3], control[b, k, 4])
+            tau, c = frame[b, 1], m * frame[b, 0]
+            _put(G, 0, 0, e * h)
+            D += ds * e
+            e *= m.conjugate()
+            for column, unit in ((1, complex(1.0, 0.0)), (2, complex(0.0, 1.0))):
+                A = unit / m
+                _put(G, 0, column, -D * h * A.conjugate())
+                _put(G, 2, column, 1j * h.conjugate() * A)
+                _put(G, 4, column, A)
+                _put(G, 6, column, -tau * unit / c)
+                _put(G, 6, column + 2, -unit / c)
+            _add_control_noise(G, cov[b, k], N)
+            frame[b, 0], frame[b, 1] = c, m * tau + t
+        _add_symmetric(N, P_a[b])
+        _move(x_p[b], P_a[b], frame[b], D, e)
 
 
-@kernel(changed(2), changed(3), changed(2, types.complex128), given(1), given(1), given(3))
+@kernel(changed(2), changed(3), changed(2, types.complex128), given(2), given(2), given(4))
 def reduced_predict_first_order(x_p, P_a, frame, ds, dalpha, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced.reduced_predict_first_order`.
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_first_order`.
 
-    Written out for noise in (ds, dalpha) only: it moves (x, y) along the old heading, (sin, cos) along the
-    tangent, A by -i dalpha and g by -dds / c_old + i (m tau + t) dalpha / c_new.
+    Written out for noise in (ds, dalpha): with dm = -i m dalpha, A is -i dalpha and g is
+    -dds / c_old + i tau_new dalpha / c_new.
     """
-    G = np.zeros((8, 2))
-    G[5, 1] = -1.0
+    G, N = np.zeros((8, 2)), np.zeros((8, 8))
+    _put(G, 4, 1, complex(0.0, -1.0))
     for b in range(x_p.shape[0]):
-        d, m = ds[b], complex(np.cos(dalpha[b]), -np.sin(dalpha[b]))
-        c_old = frame[b, 0]
-        c_new, tau = m * c_old, m * frame[b, 1] + d * m
-        along, turn = -1.0 / c_old, 1j * tau / c_new
-        G[0, 0], G[1, 0] = x_p[b, 3], x_p[b, 2]
-        P = P_a[b]
-        _step_rows(x_p[b], d, m)
-        for j in range(8):
-            _step_rows(P[:, j], d, m)
-        for i in range(8):
-            _step_rows(P[i], d, m)
-        G[2, 1], G[3, 1] = x_p[b, 3], -x_p[b, 2]
-        G[6, 0], G[7, 0], G[6, 1], G[7, 1] = along.real, along.imag, turn.real, turn.imag
-        q00, q01, q10, q11 = cov[b, 0, 0], cov[b, 0, 1], cov[b, 1, 0], cov[b, 1, 1]
-        for i in range(8):
-            u, v = G[i, 0] * q00 + G[i, 1] * q10, G[i, 0] * q01 + G[i, 1] * q11
-            for j in range(i + 1):
-                w = u * G[j, 0] + v * G[j, 1]
-                P[i, j] += w
-                if j < i:
-                    P[j, i] += w
-        frame[b, 0] = c_new
-        frame[b, 1] = tau
-        frame[b, 2] += d * frame[b, 3]
-        frame[b, 3] *= complex(m.real, -m.imag)
+        h, D, e = complex(x_p[b, 3], x_p[b, 2]), complex(0.0, 0.0), complex(1.0, 0.0)
+        c, tau = frame[b, 0], frame[b, 1]
+        _put(G, 2, 1, h.conjugate())
+        for k in range(ds.shape[1]):
+            d, m = ds[b, k], complex(np.cos(dalpha[b, k]), -np.sin(dalpha[b, k]))
+            _put(G, 0, 0, e * h)
+            _put(G, 6, 0, -_inverse(c))
+            D += d * e
+            e *= m.conjugate()
+            c *= m
+            tau = m * (tau + d)
+            _put(G, 0, 1, -1j * D * h)
+            _put(G, 6, 1, 1j * tau * _inverse(c))
+            _add_control_noise(G, cov[b, k], N)
+        frame[b, 0], frame[b, 1] = c, tau
+        _add_symmetric(N, P_a[b])
+        _move(x_p[b], P_a[b], frame[b], D, e)
+
+
+@njit(cache=True)
+def _noise_rows(x_m, b, E):
+    """Columns of E (4, M) for a landmark rho: d rho = A rho + g."""
+    for j in range(0, x_m.shape[0], b):
+        re, im = x_m[j], x_m[j + 1]
+        E[0, j], E[1, j], E[2, j] = re, -im, 1.0
+        E[0, j + 1], E[1, j + 1], E[3, j + 1] = im, re, 1.0
+
+
+@njit(cache=True)
+def _times_E(N, E, row):
+    """Row += N (4,) E."""
+    f, g, s, t = N[0], N[1], N[2], N[3]
+    p, q, r, u = E[0], E[1], E[2], E[3]
+    for j in range(row.shape[0]):
+        row[j] += f * p[j] + g * q[j] + s * r[j] + t * u[j]
+
+
+@njit(cache=True)
+def _apply_to_pose(E, P_pm, P_a, frame, NE):
+    """P_pm <- Phi P_pm + N_pg E, and NE = N_gg E for the map."""
+    D, e = frame[2], frame[3]
+    x, y = in_one_piece(P_pm[0]), in_one_piece(P_pm[1])
+    sin, cos = in_one_piece(P_pm[2]), in_one_piece(P_pm[3])
+    for j in range(E.shape[1]):
+        s, c = sin[j], cos[j]
+        x[j] += D.real * c - D.imag * s
+        y[j] += D.imag * c + D.real * s
+        sin[j] = e.imag * c + e.real * s
+        cos[j] = e.real * c - e.imag * s
+    NE[:] = 0.0
+    for i in range(4):
+        _times_E(P_a[i, 4:], E, in_one_piece(P_pm[i]))
+        _times_E(P_a[4 + i, 4:], E, NE[i])
+
+
+@njit(cache=True)
+def _add_noise(re, im, NE, even, odd):
+    """Rows of P_mm of the landmark rho = re + i im += their part of E^T N_gg E.
+
+    Two loops: one with six arrays asks for more checks of overlap than the compiler makes.
+    """
+    f, g, s, t = NE[0], NE[1], NE[2], NE[3]
+    for c in range(even.shape[0]):
+        even[c] += re * f[c] - im * g[c] + s[c]
+    for c in range(odd.shape[0]):
+        odd[c] += im * f[c] + re * g[c] + t[c]
+
+
+@njit(cache=True)
+def _change_map(W, tile, E, NE, noise, b, P_mm):
+    """P_mm += E^T N_gg E - W^T W; ``tile`` and ``noise`` are room for tiles of W and of NE.
+
+    The noise and the first two landmarks seen share a loop: seven rows are read for one that is written.
+    """
+    M, k = P_mm.shape[0], W.shape[0]
+    for lo in range(0, M, TILE):
+        hi = min(M, lo + TILE)
+        load_tile(W, lo, tile)
+        load_tile(NE, lo, noise)
+        f, g, s, t = noise[0], noise[1], noise[2], noise[3]
+        u, v, w, x = tile[0], tile[1], tile[2 % k], tile[3 % k]
+        for r in range(0, M, 2):
+            even, odd = in_one_piece(P_mm[r])[lo:hi], in_one_piece(P_mm[r + 1])[lo:hi]
+            first, re, im = 0, E[0, r], E[0, r + 1]
+            if r % b == 0 and k >= 4:
+                first = 4
+                p, q, m, n = W[0, r], W[1, r], W[2, r], W[3, r]
+                for c in range(even.shape[0]):
+                    noise_here = re * f[c] - im * g[c] + s[c]
+                    even[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+                p, q, m, n = W[0, r + 1], W[1, r + 1], W[2, r + 1], W[3, r + 1]
+                for c in range(odd.shape[0]):
+                    noise_here = im * f[c] + re * g[c] + t[c]
+                    odd[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+            elif r % b == 0:
+                _add_noise(re, im, noise, even, odd)
+            shrink_rows(W, tile, first, r, even, odd)
+
+
+@njit(cache=True)
+def _forget(P_a, frame):
+    P_a[4:, :] = 0.0
+    P_a[:, 4:] = 0.0
+    frame[2] = 0.0
+    frame[3] = 1.0
+
+
+_MAP = (given(2), changed(3), changed(3), types.int64, changed(3), changed(2, types.complex128))
+
+
+@kernel(*_MAP)
+def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_apply`."""
+    check_rows(x_m, P_pm, P_mm)
+    M = x_m.shape[1]
+    E, NE = np.zeros((4, M)), np.empty((4, M))
+    for run in range(x_m.shape[0]):
+        _noise_rows(x_m[run], b, E)
+        _apply_to_pose(E, P_pm[run], P_a[run], frame[run], NE)
+        for r in range(0, M, b):
+            even, odd = in_one_piece(P_mm[run, r]), in_one_piece(P_mm[run, r + 1])
+            _add_noise(E[0, r], E[0, r + 1], NE, even, odd)
+        _forget(P_a[run], frame[run])
+
+
+@njit(cache=True)
+def _turn_pairs(c, columns, W, S):
+    """H P from rows of P, and (H P) H^T: multiply row pairs, then column pairs, by the real matrix of c."""
+    for i in range(0, W.shape[0], 2):
+        u, v = W[i], W[i + 1]
+        for j in range(W.shape[1]):
+            s, t = u[j], v[j]
+            u[j], v[j] = c.real * s - c.imag * t, c.imag * s + c.real * t
+    for i in range(W.shape[0]):
+        w = W[i]
+        for j in range(columns.shape[0]):
+            s, t = w[columns[j]], w[columns[j] + 1]
+            S[i, 2 * j], S[i, 2 * j + 1] = c.real * s - c.imag * t, c.imag * s + c.real * t
 
 
 @kernel(
-    *(given(2), changed(3), changed(3), types.int64, changed(3), changed(2, types.complex128)),
+    *(changed(2), changed(2), *_MAP[1:]),
+    *(given(1, types.int64), given(3), given(3), changed(2), changed(3)),
 )
-def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced.reduced_apply`."""
-    B, M = x_m.shape
-    E = np.zeros((4, M))
-    NE = np.empty((4, M))
-    row = np.empty(M)
-    for run in range(B):
-        for j in range(0, M, b):
-            re, im = x_m[run, j], x_m[run, j + 1]
-            E[0, j], E[1, j], E[2, j] = re, -im, 1.0
-            E[0, j + 1], E[1, j + 1], E[3, j + 1] = im, re, 1.0
-        D, e = frame[run, 2], frame[run, 3]
-        for j in range(M):
-            s, c = P_pm[run, 2, j], P_pm[run, 3, j]
-            P_pm[run, 0, j] += D.real * c - D.imag * s
-            P_pm[run, 1, j] += D.imag * c + D.real * s
-            P_pm[run, 2, j] = e.imag * c + e.real * s
-            P_pm[run, 3, j] = e.real * c - e.imag * s
-        for i in range(4):
-            for q in range(4):
-                f = P_a[run, i, 4 + q]
-                for j in range(M):
-                    P_pm[run, i, j] += f * E[q, j]
-            for j in range(M):
-                v = 0.0
-                for q in range(4):
-                    v += P_a[run, 4 + i, 4 + q] * E[q, j]
-                NE[i, j] = v
-        for r in range(0, M, b):
-            for k in range(r, r + 2):  # world coordinates, when carried, gain no noise
-                for c in range(k + 1):
-                    row[c] = P_mm[run, k, c]
-                for i in range(4):
-                    f = E[i, k]
-                    for c in range(k + 1):
-                        row[c] += f * NE[i, c]
-                for c in range(k + 1):
-                    P_mm[run, k, c] = row[c]
-                    P_mm[run, c, k] = row[c]
-        P_a[run, 4:, :] = 0.0
-        P_a[run, :, 4:] = 0.0
-        frame[run, 2] = 0.0
-        frame[run, 3] = 1.0
+def reduced_update(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update`."""
+    check_rows(x_m, P_pm, P_mm)
+    k, M = 2 * columns.shape[0], x_m.shape[1]
+    L, W, tile = np.empty((k, k)), np.empty((k, M + 5)), np.empty((k, min(M, TILE)))
+    E, NE, noise = np.zeros((4, M)), np.empty((4, M)), np.empty((4, min(M, TILE)))
+    for run in range(x_p.shape[0]):
+        x, P, c, tau = x_m[run], P_mm[run], frame[run, 0], frame[run, 1]
+        _noise_rows(x, b, E)
+        _apply_to_pose(E, P_pm[run], P_a[run], frame[run], NE)
+        load_landmarks(P_pm[run], P, columns, W)
+        for j in range(columns.shape[0]):
+            at = columns[j]
+            _add_noise(x[at], x[at + 1], NE, W[2 * j][:M], W[2 * j + 1][:M])
+            predicted = c * complex(x[at], x[at + 1]) - tau
+            innovation[run, 2 * j] = z[run, j, 0] - predicted.real
+            innovation[run, 2 * j + 1] = z[run, j, 1] - predicted.imag
+        _turn_pairs(c, columns, W, S[run])
+        for j in range(columns.shape[0]):
+            for r in range(2):
+                W[2 * j + r, M + 4] = innovation[run, 2 * j + r]
+                for q in range(2):
+                    S[run, 2 * j + r, 2 * j + q] += cov_z[j, r, q]
+        whiten(S[run], L, W)
+        gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])
+        _change_map(W, tile, E, NE, noise, b, P)
+        _forget(P_a[run], frame[run])

@@ -12,6 +12,7 @@ measurement of k numbers costs O(k n^2).  No full F, H or K H is ever formed.
 from __future__ import annotations
 
 import copy
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,25 @@ from vslam_ref._kernels import accelerated
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+_XY = np.arange(2)
+
+
+_LINE = 8
+"""Numbers in a line of the cache, 64 bytes: vector instructions are slow on numbers that lie across two."""
+
+
+def _zeros(*shape: int) -> Array:
+    """Zeros that begin with a cache line."""
+    size = math.prod(shape)
+    buffer = np.zeros(size + _LINE - 1)
+    first = -(buffer.ctypes.data // buffer.itemsize) % _LINE
+    return buffer[first : first + size].reshape(shape)
+
+
+def _whole_lines(columns: int) -> int:
+    """Columns in an odd number of cache lines: rows a power of two apart would share sets of the cache."""
+    return _LINE * (-(-columns // _LINE) | 1)
 
 
 class Blocks:
@@ -41,12 +61,12 @@ class Blocks:
         batch, p = mean.shape
         self.b = landmark_states
         self.n = 0
-        room = capacity * self.b
+        room = _whole_lines(capacity * self.b)
         self.x_p = np.array(mean, dtype=np.float64)
         self.P_pp = np.array(cov, dtype=np.float64)
-        self._x_m = np.zeros((batch, room))
-        self._P_pm = np.zeros((batch, p, room))
-        self._P_mm = np.zeros((batch, room, room))
+        self._x_m = _zeros(batch, room)
+        self._P_pm = _zeros(batch, p, room)
+        self._P_mm = _zeros(batch, room, room)
         self._index: dict[int, int] = {}
         self._set_views()
 
@@ -61,14 +81,9 @@ class Blocks:
         """Identities of the landmarks in the map, in the order in which they entered."""
         return np.fromiter(self._index, dtype=np.int64, count=self.n)
 
-    def split(self, ids: IntArray) -> tuple[IntArray, IntArray]:
-        """Positions in ``ids`` of landmarks already in the map, and of new ones."""
-        known = np.fromiter((int(i) in self._index for i in ids), dtype=bool, count=len(ids))
-        return np.flatnonzero(known), np.flatnonzero(~known)
-
     def columns(self, ids: IntArray) -> IntArray:
-        """First map column of each landmark of ``ids``."""
-        return np.fromiter((self._index[int(i)] for i in ids), dtype=np.int64, count=len(ids)) * self.b
+        """First map column of each landmark of ``ids``, -1 for one that is not in the map yet."""
+        return np.array([self._index.get(i, -1) for i in ids.tolist()], dtype=np.int64)
 
     def append(self, ids: IntArray, mean: Array, cov: Array, cross_pose: Array, cross_map: Array) -> None:
         """Add m landmarks: mean (B, mb), cov (B, mb, mb), cross covariances (B, p, mb), (B, n b, mb)."""
@@ -76,28 +91,31 @@ class Blocks:
         if len(set(ids.tolist())) != len(ids):
             raise ValueError(f"landmark ids {ids.tolist()}: each must appear once in one measurement")
         if new > self._x_m.shape[1]:
-            self._grow(max(new, 2 * self._x_m.shape[1]))
+            self._grow(_whole_lines(max(new, 2 * self._x_m.shape[1])))
         self._x_m[:, old:new] = mean
         self._P_pm[:, :, old:new] = cross_pose
         self._P_mm[:, :old, old:new] = cross_map
         self._P_mm[:, old:new, :old] = np.swapaxes(cross_map, 1, 2)
         self._P_mm[:, old:new, old:new] = cov
         for i in ids:
-            self._index[int(i)] = self.n
+            self._index[int(i)] = self.n * self.b
             self.n += 1
         self._set_views()
 
     def _grow(self, room: int) -> None:
-        more = room - self._x_m.shape[1]
-        self._x_m = np.pad(self._x_m, ((0, 0), (0, more)))
-        self._P_pm = np.pad(self._P_pm, ((0, 0), (0, 0), (0, more)))
-        self._P_mm = np.pad(self._P_mm, ((0, 0), (0, more), (0, more)))
+        batch, p, old = self._P_pm.shape
+        x_m, P_pm, P_mm = self._x_m, self._P_pm, self._P_mm
+        self._x_m, self._P_pm = _zeros(batch, room), _zeros(batch, p, room)
+        self._P_mm = _zeros(batch, room, room)
+        self._x_m[:, :old], self._P_pm[:, :, :old], self._P_mm[:, :old, :old] = x_m, P_pm, P_mm
 
     def __deepcopy__(self, memo: dict[int, object]) -> Blocks:
         """Copy the arrays once and look at the copies; a plain deep copy would part views from arrays."""
         twin = copy.copy(self)
         for name in ("x_p", "P_pp", "_x_m", "_P_pm", "_P_mm"):
-            setattr(twin, name, getattr(self, name).copy())
+            mine = getattr(self, name)
+            setattr(twin, name, _zeros(*mine.shape))
+            getattr(twin, name)[...] = mine
         twin._index = dict(self._index)
         twin._set_views()
         return twin
@@ -154,20 +172,47 @@ def landmark_update(
     """
     B, m, _, p = H_p.shape
     k, M = 2 * m, P_mm.shape[2]
-    pairs = (columns[:, None] + np.arange(2)).ravel()  # (k,)
-    HP_p = H_l @ P_pm[:, :, pairs].swapaxes(1, 2).reshape(B, m, 2, p) + H_p @ P_pp[:, None]
-    HP_m = H_l @ P_mm[:, pairs].reshape(B, m, 2, M) + H_p @ P_pm[:, None]
-    # H P and the innovation in one array, so that one product whitens all three
-    HP = np.concatenate([HP_p.reshape(B, k, p), HP_m.reshape(B, k, M), innovation[:, :, None]], 2)
-    HPH = HP[:, :, p + pairs].reshape(B, k, m, 2)
-    S = HP[:, :, :p] @ H_p.reshape(B, k, p).swapaxes(1, 2)
-    S += np.einsum("bkmj,bmij->bkmi", HPH, H_l).reshape(B, k, k)
-    np.einsum("bminj->bmnij", S.reshape(B, m, 2, m, 2))[:, range(m), range(m)] += cov_z
-    W = np.linalg.inv(np.linalg.cholesky(S)) @ HP
-    W_p, W_m, y = W[:, :, :p], W[:, :, p:-1], W[:, :, -1:]
-    x_p += (W_p.swapaxes(1, 2) @ y)[:, :, 0]
-    x_m += (W_m.swapaxes(1, 2) @ y)[:, :, 0]
-    P_pp -= W_p.swapaxes(1, 2) @ W_p
-    P_pm -= W_p.swapaxes(1, 2) @ W_m
-    P_mm -= W_m.swapaxes(1, 2) @ W_m
+    pairs = map_columns(columns)
+    H = np.zeros((B, k, p + k))  # in the pose and the landmarks seen; elsewhere it is zero
+    H[:, :, :p] = H_p.reshape(B, k, p)
+    landmark_blocks(H[:, :, p:])[...] = H_l
+    rows = np.empty((B, p + k, p + M))  # the rows of P that H meets
+    rows[:, :p, :p], rows[:, :p, p:] = P_pp, P_pm
+    rows[:, p:, :p], rows[:, p:, p:] = P_pm.take(pairs, 2).swapaxes(1, 2), P_mm.take(pairs, 1)
+    HP = H @ rows
+    met = np.concatenate([np.arange(p), p + pairs])
+    S = HP.take(met, 2) @ H.swapaxes(1, 2)
+    landmark_blocks(S)[...] += cov_z
+    W, y = whitened(HP, innovation, S)
+    move_means(x_p, x_m, W, y)
+    WW = W.swapaxes(1, 2) @ W
+    P_pp -= WW[:, :p, :p]
+    P_pm -= WW[:, :p, p:]
+    P_mm -= WW[:, p:, p:]
     return S
+
+
+def map_columns(columns: IntArray) -> IntArray:
+    """Columns (2 m,) of both coordinates of the landmarks that start at ``columns`` (m,)."""
+    return (columns[:, None] + _XY).ravel()
+
+
+def landmark_blocks(A: Array) -> Array:
+    """View (B, m, 2, 2) of the 2 x 2 blocks on the diagonal of A (B, 2 m, 2 m)."""
+    m = A.shape[1] // 2
+    blocks: Array = np.einsum("bkikj->bkij", A.reshape(len(A), m, 2, m, 2))
+    return blocks
+
+
+def whitened(HP: Array, innovation: Array, S: Array) -> tuple[Array, Array]:
+    """W = L^-1 H P (B, k, D) and L^-1 innovation (B, k), with S = L L^T."""
+    both = np.concatenate([HP, innovation[:, :, None]], 2)
+    both = np.linalg.inv(np.linalg.cholesky(S)) @ both
+    return both[:, :, :-1], both[:, :, -1]
+
+
+def move_means(x_p: Array, x_m: Array, W: Array, y: Array) -> None:
+    """Add W^T y, the gain times the innovation, to the means, pose first."""
+    step = (y[:, None] @ W)[:, 0]
+    x_p += step[:, : x_p.shape[1]]
+    x_m += step[:, x_p.shape[1] :]

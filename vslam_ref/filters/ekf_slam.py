@@ -33,6 +33,7 @@ from vslam_ref.filters.estimates import (
     as_batch,
     checked_measurement,
     diagonal_blocks,
+    room_for_innovation,
 )
 from vslam_ref.geometry import se2, so2
 
@@ -81,7 +82,8 @@ class EkfSlam:
     def predict(self, increment: vehicle.Increment) -> None:
         """Move the pose by an increment; the map stays. Implements :eq:`eq-b4` (B4)."""
         b = self.blocks
-        at = np.stack([self._linearisation()[:, 2], self._distance(increment)], 1)
+        at = np.empty((len(b.x_p), 2))
+        at[:, 0], at[:, 1] = self._linearisation()[:, 2], self._distance(increment)
         ekf_predict(b.x_p, b.P_pp, b.P_pm, at, *increment)
         self._step += 1
 
@@ -115,18 +117,23 @@ class EkfSlam:
             None when no landmark was known before.
         """
         ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self.blocks.x_p))
-        known, new = self.blocks.split(ids)
-        seen = self._update_known(ids[known], z[:, known], cov_z[known]) if len(known) else None
-        if len(new):
-            self._augment(ids[new], z[:, new], cov_z[new])
+        columns = self.blocks.columns(ids)
+        known = columns >= 0
+        if known.all():
+            return self._update_known(ids, columns, z, cov_z) if len(ids) else None
+        seen = None
+        if known.any():
+            seen = self._update_known(ids[known], columns[known], z[:, known], cov_z[known])
+        self._augment(ids[~known], z[:, ~known], cov_z[~known])
         return seen
 
-    def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
+    def _update_known(self, ids: IntArray, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
         """Update with the measurement z = h + noise. Implements :eq:`eq-b20` (B20)."""
         b = self.blocks
-        columns = b.columns(ids)
         if self._truth is None:
-            return Innovation(*ekf_update(b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, columns, z, cov_z))
+            seen = room_for_innovation(z)
+            ekf_update(b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, columns, z, cov_z, *seen)
+            return seen
         landmarks = b.x_m.reshape(len(b.x_p), -1, 2)[:, columns // 2]
         innovation = (z - observation.vehicle_from_world(b.x_p[:, None], landmarks)).reshape(len(z), -1)
         H = observation.vehicle_from_world_with_jacobians(

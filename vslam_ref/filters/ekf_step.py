@@ -19,11 +19,14 @@ from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.filters import observation
-from vslam_ref.filters.block_covariance import landmark_update
+from vslam_ref.filters.block_covariance import landmark_update, map_columns
 from vslam_ref.geometry import so2
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+_FG = np.array([[1.0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 0, 1]])
+"""The constant part of F and G, side by side."""
 
 
 @accelerated("slam:ekf_predict")
@@ -32,8 +35,8 @@ def ekf_predict(
 ) -> None:
     """One prediction, in place: pose mean, P_pp <- F P_pp F^T + G Q G^T and P_pm <- F P_pm.
 
-    Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): rows
-    and columns 0 and 1 gain a multiple of row and column 2, and nothing else moves.
+    Implements :eq:`eq-b4` (B4).  F is the identity but for its last column (-ds sin, ds cos, 1): of P_pm,
+    rows 0 and 1 gain a multiple of row 2, and nothing else moves.
 
     Parameters
     ----------
@@ -46,16 +49,16 @@ def ekf_predict(
         The increment.
     """
     c, s, d = np.cos(at[:, 0]), np.sin(at[:, 0]), at[:, 1]
-    gain, G = np.empty((len(at), 2, 1)), np.zeros((len(at), 3, 2))
-    gain[:, 0, 0], gain[:, 1, 0] = -d * s, d * c
-    G[:, 0, 0], G[:, 1, 0], G[:, 2, 1] = c, s, 1.0
+    FG = np.empty((len(at), 3, 5))
+    FG[:] = _FG
+    F, G = FG[:, :, :3], FG[:, :, 3:]
+    F[:, 0, 2], F[:, 1, 2] = -d * s, d * c
+    G[:, 0, 0], G[:, 1, 0] = c, s
     x_p[:, 0] += ds * np.cos(x_p[:, 2])
     x_p[:, 1] += ds * np.sin(x_p[:, 2])
     x_p[:, 2] = so2.wrap(x_p[:, 2] + dalpha)
-    P_pp[:, :2] += gain * P_pp[:, 2:]
-    P_pp[:, :, :2] += P_pp[:, :, 2:] * gain.swapaxes(1, 2)
-    P_pp += G @ cov @ G.swapaxes(1, 2)
-    P_pm[:, :2] += gain * P_pm[:, 2:]
+    P_pp[:] = F @ P_pp @ F.swapaxes(1, 2) + G @ cov @ G.swapaxes(1, 2)
+    P_pm[:, :2] += F[:, :2, 2:] * P_pm[:, 2:]
 
 
 @accelerated("slam:ekf_update")
@@ -68,7 +71,9 @@ def ekf_update(
     columns: IntArray,
     z: Array,
     cov_z: Array,
-) -> tuple[Array, Array]:
+    innovation: Array,
+    S: Array,
+) -> None:
     """Update with m landmarks of the map at once, in place, linearised at the estimate.
 
     Implements :eq:`eq-b21` (B21) and its Jacobians.
@@ -83,20 +88,14 @@ def ekf_update(
         Relative Cartesian measurements, metres.
     cov_z : ndarray, shape (m, 2, 2)
         Their covariances.
-
-    Returns
-    -------
-    innovation : ndarray, shape (B, 2 m)
-        measured - predicted.
-    S : ndarray, shape (B, 2 m, 2 m)
-        Its covariance.
+    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
+        Room for measured - predicted and its covariance; filled.
     """
-    landmarks = x_m[:, columns[:, None] + np.arange(2)]
+    landmarks = x_m.take(map_columns(columns), 1).reshape(z.shape)
     H = observation.vehicle_from_world_with_jacobians(x_p[:, None], landmarks)
-    innovation = (z - H.value).reshape(len(z), -1)
-    S = landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z)
+    innovation[...] = (z - H.value).reshape(innovation.shape)
+    S[...] = landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z)
     x_p[:, 2] = so2.wrap(x_p[:, 2])
-    return innovation, S
 
 
 @accelerated("slam:ekf_step")
@@ -112,9 +111,11 @@ def ekf_step(
     columns: IntArray,
     z: Array,
     cov_z: Array,
-) -> tuple[Array, Array]:
+    innovation: Array,
+    S: Array,
+) -> None:
     """:func:`ekf_predict` by the increment ds, dalpha (B,), cov (B, 2, 2), then :func:`ekf_update`."""
     at = np.empty((len(x_p), 2))
     at[:, 0], at[:, 1] = x_p[:, 2], ds
     ekf_predict(x_p, P_pp, P_pm, at, ds, dalpha, cov)
-    return ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z)
+    ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S)

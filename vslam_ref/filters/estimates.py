@@ -20,6 +20,12 @@ class Innovation(NamedTuple):
     S: Array
 
 
+def room_for_innovation(z: Array) -> Innovation:
+    """Empty arrays for the innovation of measurements z (B, m, 2)."""
+    B, m, _ = z.shape
+    return Innovation(np.empty((B, 2 * m)), np.empty((B, 2 * m, 2 * m)))
+
+
 class PoseEstimate(NamedTuple):
     """Mean (B, 3) of (x, y, theta) in the world and its covariance (B, 3, 3)."""
 
@@ -91,7 +97,7 @@ def checked_measurement(
         raise ValueError(f"measurement covariance {cov_z.shape}: need (2, 2) or ({len(ids)}, 2, 2)")
     if not (np.isfinite(z).all() and np.isfinite(cov_z).all()):
         raise ValueError("measurements and their covariance must be finite")
-    return ids, z, np.broadcast_to(cov_z, (len(ids), 2, 2))
+    return ids, z, cov_z if cov_z.ndim == 3 else np.broadcast_to(cov_z, (len(ids), 2, 2))
 
 
 def diagonal_blocks(P: Array, stride: int, size: int) -> Array:

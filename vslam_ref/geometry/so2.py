@@ -34,9 +34,9 @@ def wrap(angle: ArrayLike) -> Array:
     True
     """
     a = np.asarray(angle, dtype=np.float64)
-    inside = (a > -np.pi) & (a <= np.pi)
-    if inside.all():
+    if np.abs(a).max(initial=0.0) < np.pi:  # the common case, cheaply
         return a.copy()
+    inside = (a > -np.pi) & (a <= np.pi)
     turned = np.pi - np.mod(np.pi - a, 2.0 * np.pi)
     # mod of a number a hair below 0 rounds to 2 pi, which would give -pi, the excluded end
     turned = np.where(turned <= -np.pi, np.pi, turned)

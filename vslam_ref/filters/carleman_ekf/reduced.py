@@ -14,6 +14,9 @@ noise does:  d rho = A rho + g,  A = dm / m,  g = -(dm tau + dt) / c.  The numbe
 to all landmarks, so ten predictions leave a noise of rank four, applied once when a measurement
 arrives.  A prediction then costs O(1), a measurement O(k n^2).
 
+Increments compose as well.  They are put down, up to ``WAITING`` of them, and used together when a
+measurement arrives or the pose is asked for: what they do is a handful of sums and products over them.
+
 ``with_map=True`` carries each landmark's world coordinates too, 4 + 4 n states.
 """
 
@@ -24,12 +27,14 @@ import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref._kernels import accelerated
-from vslam_ref.filters.block_covariance import Blocks, landmark_update
-from vslam_ref.filters.carleman_ekf.reduced_moments import (
-    control_first_order,
-    control_gaussian,
-    start_moments,
+from vslam_ref.filters.block_covariance import Blocks
+from vslam_ref.filters.carleman_ekf.reduced_moments import control_gaussian, start_moments
+from vslam_ref.filters.carleman_ekf.reduced_step import (
+    as_matrix,
+    reduced_apply,
+    reduced_predict,
+    reduced_predict_first_order,
+    reduced_update,
 )
 from vslam_ref.filters.estimates import (
     Innovation,
@@ -38,96 +43,17 @@ from vslam_ref.filters.estimates import (
     as_batch,
     checked_measurement,
     diagonal_blocks,
+    room_for_innovation,
 )
 from vslam_ref.filters.vehicle import Increment
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
 
 
+WAITING = 16
+"""Increments put down before they are used at the latest."""
 _CONTROL = ("first_order", "gaussian")
-
-
-def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
-    """One prediction from the control's moments; see :func:`reduced_predict`."""
-    ds, m, t = control[:, 0], control[:, 1] + 1j * control[:, 2], control[:, 3] + 1j * control[:, 4]
-    c, tau = m * frame[:, 0], frame[:, 1]
-    step = np.zeros((len(x_p), 4, 4))
-    step[:, 0, 0] = step[:, 1, 1] = 1.0
-    step[:, 0, 3] = step[:, 1, 2] = ds
-    step[:, 2, 2] = step[:, 3, 3] = control[:, 1]
-    step[:, 2, 3], step[:, 3, 2] = -control[:, 2], control[:, 2]
-    # columns: what a unit noise in ds, Re m, Im m, Re t, Im t does to (x, y, sin, cos), to A and to g
-    J = np.zeros((len(x_p), 8, 5))
-    J[:, 0, 0], J[:, 1, 0] = x_p[:, 3], x_p[:, 2]
-    J[:, 2, 1], J[:, 2, 2] = x_p[:, 2], -x_p[:, 3]
-    J[:, 3, 1:3] = x_p[:, :1:-1]
-    for row, column, factor in ((4, 1, 1 / m), (6, 1, -tau / c), (6, 3, -1 / c)):
-        J[:, row, column], J[:, row, column + 1] = factor.real, -factor.imag
-        J[:, row + 1, column], J[:, row + 1, column + 1] = factor.imag, factor.real
-    x_p[:] = (step @ x_p[:, :, None])[:, :, 0]
-    P_a[:, :4] = step @ P_a[:, :4]
-    P_a[:, :, :4] = P_a[:, :, :4] @ step.swapaxes(1, 2)
-    P_a += J @ cov @ J.swapaxes(1, 2)
-    frame[:, 0], frame[:, 1] = c, m * tau + t
-    frame[:, 2] += ds * frame[:, 3]
-    frame[:, 3] *= m.conj()
-
-
-@accelerated("reduced:reduced_predict")
-def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
-    """One prediction, in place, without touching a landmark.
-
-    Implements :eq:`eq-b7`, :eq:`eq-b8`, :eq:`eq-b9`, :eq:`eq-b10` and :eq:`eq-b11` (B7-B11): ``step``
-    is A, and the first four rows of ``J`` are J, its columns for (u1, u3, -u2).
-
-    Parameters
-    ----------
-    x_p : ndarray, shape (B, 4)
-        (x, y, sin, cos).
-    P_a : ndarray, shape (B, 8, 8)
-        Covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) accumulated since the
-        last measurement.
-    frame : ndarray of complex, shape (B, 4)
-        c and tau; and, since the last measurement, D and e with p <- p + D h, h <- e h.
-    control, cov : ndarray, shapes (B, 5), (B, 5, 5)
-        Moments of (ds, Re m, Im m, Re t, Im t).
-    """
-    _predict(x_p, P_a, frame, control, cov)
-
-
-@accelerated("reduced:reduced_predict_first_order")
-def reduced_predict_first_order(
-    x_p: Array, P_a: Array, frame: Complex, ds: Array, dalpha: Array, cov: Array
-) -> None:
-    """:func:`reduced_predict` with the first-order moments of an increment ds, dalpha (B,), cov (B, 2, 2)."""
-    _predict(x_p, P_a, frame, *control_first_order(Increment(ds, dalpha, cov)))
-
-
-@accelerated("reduced:reduced_apply")
-def reduced_apply(x_m: Array, P_pm: Array, P_mm: Array, b: int, P_a: Array, frame: Complex) -> None:
-    """Apply the accumulated transition and noise to the map blocks, in place, and start afresh.
-
-    P_pm <- Phi P_pm + N_pg E^T and P_mm <- P_mm + E N_gg E^T, where Phi is the pose transition of D
-    and e, N_pg and N_gg are blocks of P_a, and the rows of E for a landmark rho say d rho = A rho + g.
-    Each landmark has ``b`` map states, rho first.
-    """
-    B, M = x_m.shape
-    E = np.zeros((B, M, 4))
-    re, im = x_m[:, 0::b], x_m[:, 1::b]
-    E[:, 0::b, 0], E[:, 0::b, 1], E[:, 0::b, 2] = re, -im, 1.0
-    E[:, 1::b, 0], E[:, 1::b, 1], E[:, 1::b, 3] = im, re, 1.0
-    phi = np.zeros((B, 4, 4))
-    phi[:, 0, 0] = phi[:, 1, 1] = 1.0
-    D, e = frame[:, 2], frame[:, 3]
-    phi[:, 0, 3], phi[:, 0, 2], phi[:, 1, 3], phi[:, 1, 2] = D.real, -D.imag, D.imag, D.real
-    phi[:, 3, 3], phi[:, 3, 2], phi[:, 2, 3], phi[:, 2, 2] = e.real, -e.imag, e.imag, e.real
-    P_pm[:] = phi @ P_pm + P_a[:, :4, 4:] @ E.swapaxes(1, 2)
-    P_mm += E @ P_a[:, 4:, 4:] @ E.swapaxes(1, 2)
-    P_a[:, 4:, :] = 0.0
-    P_a[:, :, 4:] = 0.0
-    frame[:, 2], frame[:, 3] = 0.0, 1.0
 
 
 class ReducedCarlemanEkf:
@@ -159,26 +85,50 @@ class ReducedCarlemanEkf:
         x, P = start_moments(*as_batch(mean, cov), start)
         self._first_order = control == "first_order"
         self.with_map = with_map
-        self.blocks = Blocks(x, P, landmark_states=4 if with_map else 2, capacity=capacity)
+        self._blocks = Blocks(x, P, landmark_states=4 if with_map else 2, capacity=capacity)
         self._frame = np.tile(np.array([1.0, 0.0, 0.0, 1.0], dtype=np.complex128), (len(x), 1))
         self._P_a = np.zeros((len(x), 8, 8))
-        self._P_a[:, :4, :4] = self.blocks.P_pp
-        self.blocks.P_pp = self._P_a[:, :4, :4]
+        self._P_a[:, :4, :4] = P
+        self._blocks.P_pp = self._P_a[:, :4, :4]
+        sizes = (len(x), WAITING)
+        self._waiting = Increment(np.empty(sizes), np.empty(sizes), np.empty((*sizes, 2, 2)))
+        self._waits = 0
 
     def __deepcopy__(self, memo: dict[int, object]) -> ReducedCarlemanEkf:
         """Copy the arrays, and let the copy's pose covariance be a part of its own augmented one."""
         twin = copy.copy(self)
-        twin.blocks = copy.deepcopy(self.blocks)
+        twin._blocks = copy.deepcopy(self._blocks)
         twin._frame, twin._P_a = self._frame.copy(), self._P_a.copy()
-        twin.blocks.P_pp = twin._P_a[:, :4, :4]
+        twin._blocks.P_pp = twin._P_a[:, :4, :4]
+        twin._waiting = Increment(*(part.copy() for part in self._waiting))
         return twin
+
+    @property
+    def blocks(self) -> Blocks:
+        """Mean and covariance; all increments so far are in the pose's blocks."""
+        self._settle()
+        return self._blocks
 
     def predict(self, increment: Increment) -> None:
         """Move by an increment, in O(1). The reduced :eq:`eq-b16` (B16) and B18."""
+        ds, dalpha, cov = self._waiting
+        ds[:, self._waits], dalpha[:, self._waits], cov[:, self._waits] = increment
+        self._waits += 1
+        if self._waits == WAITING:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Use the increments that wait."""
+        k, self._waits = self._waits, 0
+        if k == 0:
+            return
+        ds, dalpha, cov = (part[:, :k] for part in self._waiting)
+        state = self._blocks.x_p, self._P_a, self._frame
         if self._first_order:
-            reduced_predict_first_order(self.blocks.x_p, self._P_a, self._frame, *increment)
+            reduced_predict_first_order(*state, ds, dalpha, cov)
         else:
-            reduced_predict(self.blocks.x_p, self._P_a, self._frame, *control_gaussian(increment))
+            mean, noise = control_gaussian(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
+            reduced_predict(*state, mean.reshape(-1, k, 5), noise.reshape(-1, k, 5, 5))
 
     def _apply(self) -> None:
         b = self.blocks
@@ -186,27 +136,26 @@ class ReducedCarlemanEkf:
 
     def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
         """Update with landmarks of the map, then add the new ones; as :meth:`EkfSlam.update`."""
-        ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self.blocks.x_p))
-        self._apply()
-        known, new = self.blocks.split(ids)
-        seen = self._update_known(ids[known], z[:, known], cov_z[known]) if len(known) else None
-        if len(new):
-            self._augment(ids[new], z[:, new], cov_z[new])
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self._blocks.x_p))
+        columns = self.blocks.columns(ids)
+        known = columns >= 0
+        if len(ids) and known.all():
+            return self._update_known(columns, z, cov_z)
+        seen = None
+        if known.any():
+            seen = self._update_known(columns[known], z[:, known], cov_z[known])
+        else:
+            self._apply()
+        if len(ids):
+            self._augment(ids[~known], z[:, ~known], cov_z[~known])
         return seen
 
-    def _update_known(self, ids: IntArray, z: Array, cov_z: Array) -> Innovation:
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
         """Use z = c rho - tau + noise: the reduced :eq:`eq-b22` (B22)."""
-        b = self.blocks
-        columns = b.columns(ids)
-        c, tau = self._frame[:, 0:1], self._frame[:, 1:2]
-        predicted = c * (b.x_m[:, columns] + 1j * b.x_m[:, columns + 1]) - tau
-        innovation = z - np.stack([predicted.real, predicted.imag], -1)
-        H_l = np.broadcast_to(_as_matrix(c), (*z.shape, 2))
-        H_p = np.zeros((*z.shape, 4))
-        flat = innovation.reshape(len(z), -1)
-        return Innovation(
-            flat, landmark_update(b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, H_p, H_l, columns, flat, cov_z)
-        )
+        b, seen = self.blocks, room_for_innovation(z)
+        state = b.x_p, b.x_m, b.P_pm, b.P_mm, b.b, self._P_a, self._frame
+        reduced_update(*state, columns, z, cov_z, *seen)
+        return seen
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """r_new = z, uncorrelated with everything; its world place p + h z, when carried, is not."""
@@ -217,13 +166,13 @@ class ReducedCarlemanEkf:
         rho = (zc + tau) / c
         mean, J_z = np.zeros((B, m, b.b)), np.zeros((B, m, b.b, 2))
         mean[..., 0], mean[..., 1] = rho.real, rho.imag
-        J_z[:, :, :2] = _as_matrix(1 / c)
+        J_z[:, :, :2] = as_matrix(1 / c)
         J_pose = np.zeros((B, m, b.b, 4))
         if self.with_map:
             h = b.x_p[:, 3:4] + 1j * b.x_p[:, 2:3]
             place = b.x_p[:, 0:1] + 1j * b.x_p[:, 1:2] + h * zc
             mean[..., 2], mean[..., 3] = place.real, place.imag
-            J_z[:, :, 2:] = _as_matrix(h)
+            J_z[:, :, 2:] = as_matrix(h)
             J_pose[:, :, 2, 0] = J_pose[:, :, 3, 1] = 1.0
             J_pose[:, :, 2, 2], J_pose[:, :, 2, 3] = -z[..., 1], z[..., 0]
             J_pose[:, :, 3, 2], J_pose[:, :, 3, 3] = z[..., 0], z[..., 1]
@@ -258,8 +207,3 @@ class ReducedCarlemanEkf:
         b = self.blocks
         mean = b.x_m.reshape(len(b.x_p), -1, 4)[:, :, 2:].copy()
         return MapEstimate(b.ids, mean, diagonal_blocks(b.P_mm, 4, 4)[:, :, 2:, 2:])
-
-
-def _as_matrix(c: Complex) -> Array:
-    """Multiplication by c (...) as a real matrix (..., 2, 2)."""
-    return np.stack([np.stack([c.real, -c.imag], -1), np.stack([c.imag, c.real], -1)], -2)

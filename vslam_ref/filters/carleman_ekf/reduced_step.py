@@ -1,0 +1,200 @@
+"""One cycle of the reduced filter on plain arrays: k predictions at once, then an update.
+
+::
+
+    x_p (B, 4)        x, y, sin, cos
+    x_m (B, M)        rho of every landmark: b numbers each, rho first
+    P_a (B, 8, 8)     covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) that waits
+    frame (B, 4)      complex: c and tau;  and what waits: D and e with p <- p + D h, h <- e h
+
+    reduced_predict   k controls at once: x_p, P_a and frame; no landmark is touched        O(k)
+    reduced_apply     what waits goes into the map: P_pm <- Phi P_pm + N_pg E, P_mm += E^T N_gg E
+    reduced_update    the same and a measurement, in one pass over P_mm                     O(m n^2)
+
+All functions work in place on a batch of B runs.  The formulas are those at the head of
+:mod:`vslam_ref.filters.carleman_ekf.reduced`, which keeps the books.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.filters.block_covariance import landmark_blocks, map_columns, move_means, whitened
+from vslam_ref.filters.carleman_ekf.reduced_moments import control_first_order
+from vslam_ref.filters.vehicle import Increment
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+IntArray = NDArray[np.int64]
+
+_I = np.array([-1j, 1j, 1j, 1j])
+"""What a noise in Im m does to p, i conj(h), A and g, over what one in Re m does."""
+
+
+def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
+    """K controls from their moments; see :func:`reduced_predict`."""
+    ds, m, t = control[..., 0], control[..., 1] + 1j * control[..., 2], control[..., 3] + 1j * control[..., 4]
+    h = x_p[:, 3:] + 1j * x_p[:, 2:3]
+    # after control j: c = turned c_0, tau_j = m_j tau_{j-1} + t_j, h_j = e h_0, p_j = p_0 + D h_0
+    turned = m.cumprod(1)
+    c, tau = turned * frame[:, :1], turned * (frame[:, 1:2] + (t / turned).cumsum(1))
+    e = turned.conj()
+    e_before, tau_before = np.ones_like(e), np.empty_like(tau)
+    e_before[:, 1:] = e[:, :-1]
+    tau_before[:, :1], tau_before[:, 1:] = frame[:, 1:2], tau[:, :-1]
+    D = (ds * e_before).cumsum(1)
+
+    # what unit noises in ds, Re m, Im m, Re t, Im t of control j do to p, i conj(h) = sin + i cos, A and g;
+    # to p and h as if at the start, so that the transition of all controls takes them to the end
+    J = np.zeros((*m.shape, 4, 5), dtype=np.complex128)
+    J[..., 0, 0], J[..., 0, 1] = e_before * h, -D * h / m.conj()
+    J[..., 1, 1], J[..., 2, 1] = 1j * h.conj() / m, 1 / m
+    J[..., 3, 1], J[..., 3, 3] = -tau_before / c, -1 / c
+    J[..., 2], J[..., 4] = _I * J[..., 1], _I * J[..., 3]
+    G = np.stack([J.real, J.imag], 3).reshape(*m.shape, 8, 5)
+
+    phi = _transition(D[:, -1], e[:, -1])
+    x_p[:] = (phi @ x_p[:, :, None])[:, :, 0]
+    P_a += (G @ cov @ G.swapaxes(2, 3)).sum(1)
+    P_a[:, :4] = phi @ P_a[:, :4]
+    P_a[:, :, :4] = P_a[:, :, :4] @ phi.swapaxes(1, 2)
+    frame[:, 0], frame[:, 1] = c[:, -1], tau[:, -1]
+    frame[:, 2] += D[:, -1] * frame[:, 3]
+    frame[:, 3] *= e[:, -1]
+
+
+def _transition(D: Complex, e: Complex) -> Array:
+    """Matrix (B, 4, 4) of p <- p + D h, h <- e h in (x, y, sin, cos)."""
+    phi = np.zeros((len(D), 4, 4))
+    phi[:, 0, 0] = phi[:, 1, 1] = 1.0
+    phi[:, 0, 3], phi[:, 0, 2], phi[:, 1, 3], phi[:, 1, 2] = D.real, -D.imag, D.imag, D.real
+    phi[:, 3, 3], phi[:, 3, 2], phi[:, 2, 3], phi[:, 2, 2] = e.real, -e.imag, e.imag, e.real
+    return phi
+
+
+@accelerated("reduced:reduced_predict")
+def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
+    """Predict k controls, one after the other, without touching a landmark.
+
+    Implements :eq:`eq-b7`, :eq:`eq-b8`, :eq:`eq-b9`, :eq:`eq-b10` and :eq:`eq-b11` (B7-B11), chained: A is
+    the matrix of p <- p + D h, h <- e h of all controls, and each control's noise is taken along.
+
+    Parameters
+    ----------
+    x_p : ndarray, shape (B, 4)
+        (x, y, sin, cos).
+    P_a : ndarray, shape (B, 8, 8)
+        Covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) accumulated since the
+        last measurement.
+    frame : ndarray of complex, shape (B, 4)
+        c and tau; and, since the last measurement, D and e with p <- p + D h, h <- e h.
+    control, cov : ndarray, shapes (B, k, 5), (B, k, 5, 5)
+        Moments of (ds, Re m, Im m, Re t, Im t) of each control; the noises of two controls are independent.
+    """
+    _predict(x_p, P_a, frame, control, cov)
+
+
+@accelerated("reduced:reduced_predict_first_order")
+def reduced_predict_first_order(
+    x_p: Array, P_a: Array, frame: Complex, ds: Array, dalpha: Array, cov: Array
+) -> None:
+    """:func:`reduced_predict` with first-order moments of increments ds, dalpha (B, k), cov (B, k, 2, 2)."""
+    mean, noise = control_first_order(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
+    _predict(x_p, P_a, frame, mean.reshape(*ds.shape, 5), noise.reshape(*ds.shape, 5, 5))
+
+
+def _noise_rows(x_m: Array, b: int) -> Array:
+    """E (B, 4, M): its columns for a landmark rho say d rho = A rho + g; other map states gain no noise."""
+    E = np.zeros((len(x_m), 4, x_m.shape[1]))
+    re, im = x_m[:, 0::b], x_m[:, 1::b]
+    E[:, 0, 0::b], E[:, 1, 0::b], E[:, 2, 0::b] = re, -im, 1.0
+    E[:, 0, 1::b], E[:, 1, 1::b], E[:, 3, 1::b] = im, re, 1.0
+    return E
+
+
+def _forget(P_a: Array, frame: Complex) -> None:
+    """Nothing waits any more."""
+    P_a[:, 4:, :] = 0.0
+    P_a[:, :, 4:] = 0.0
+    frame[:, 2], frame[:, 3] = 0.0, 1.0
+
+
+@accelerated("reduced:reduced_apply")
+def reduced_apply(x_m: Array, P_pm: Array, P_mm: Array, b: int, P_a: Array, frame: Complex) -> None:
+    """Apply the accumulated transition and noise to the map blocks, in place, and start afresh.
+
+    P_pm <- Phi P_pm + N_pg E and P_mm <- P_mm + E^T N_gg E, where Phi is the pose transition of D and e, and
+    N_pg and N_gg are blocks of P_a.  Each landmark has ``b`` map states, rho first.
+    """
+    E = _noise_rows(x_m, b)
+    P_pm[:] = _transition(frame[:, 2], frame[:, 3]) @ P_pm + P_a[:, :4, 4:] @ E
+    P_mm += E.swapaxes(1, 2) @ (P_a[:, 4:, 4:] @ E)
+    _forget(P_a, frame)
+
+
+@accelerated("reduced:reduced_update")
+def reduced_update(
+    x_p: Array,
+    x_m: Array,
+    P_pm: Array,
+    P_mm: Array,
+    b: int,
+    P_a: Array,
+    frame: Complex,
+    columns: IntArray,
+    z: Array,
+    cov_z: Array,
+    innovation: Array,
+    S: Array,
+) -> None:
+    """:func:`reduced_apply`, and use z = c rho - tau + noise of m landmarks, in place.
+
+    Implements the reduced :eq:`eq-b22` (B22).  H is the real matrix of c at each landmark seen, and zero
+    elsewhere.  The noise that waits and the gain change P_mm in one product: P_mm += E^T (N_gg E) - W^T W.
+
+    Parameters
+    ----------
+    x_p, x_m, P_pm, P_mm, b, P_a, frame
+        As above; changed in place.
+    columns : ndarray of int, shape (m,)
+        First map column of each landmark seen.
+    z : ndarray, shape (B, m, 2)
+        Relative Cartesian measurements, metres.
+    cov_z : ndarray, shape (m, 2, 2)
+        Their covariances.
+    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
+        Room for measured - predicted and its covariance; filled.
+    """
+    B, m, _ = z.shape
+    pairs = map_columns(columns)
+    E = _noise_rows(x_m, b)
+    NE = P_a[:, 4:, 4:] @ E
+    P_pm[:] = _transition(frame[:, 2], frame[:, 3]) @ P_pm + P_a[:, :4, 4:] @ E
+    c, tau = frame[:, :1], frame[:, 1:2]
+    predicted = c * (x_m[:, columns] + 1j * x_m[:, columns + 1]) - tau
+    innovation[:, 0::2], innovation[:, 1::2] = z[..., 0] - predicted.real, z[..., 1] - predicted.imag
+
+    turn = as_matrix(c)  # (B, 1, 2, 2)
+    rows = np.empty((B, 2 * m, 4 + x_m.shape[1]))
+    rows[:, :, :4] = P_pm.take(pairs, 2).swapaxes(1, 2)
+    rows[:, :, 4:] = P_mm.take(pairs, 1) + E.take(pairs, 2).swapaxes(1, 2) @ NE
+    HP = (turn @ rows.reshape(B, m, 2, -1)).reshape(rows.shape)
+    S[...] = (HP.take(4 + pairs, 2).reshape(B, -1, m, 2) @ turn.swapaxes(2, 3)).reshape(S.shape)
+    landmark_blocks(S)[...] += cov_z
+    W, y = whitened(HP, innovation, S)
+    move_means(x_p, x_m, W, y)
+    W_p, W_m = W[:, :, :4], W[:, :, 4:]
+    P_a[:, :4, :4] -= W_p.swapaxes(1, 2) @ W_p
+    P_pm -= W_p.swapaxes(1, 2) @ W_m
+    P_mm += np.concatenate([E, W_m], 1).swapaxes(1, 2) @ np.concatenate([NE, -W_m], 1)
+    _forget(P_a, frame)
+
+
+def as_matrix(c: Complex) -> Array:
+    """Multiplication by c (...) as a real matrix (..., 2, 2)."""
+    matrix = np.empty((*c.shape, 2, 2))
+    matrix[..., 0, 0] = matrix[..., 1, 1] = c.real
+    matrix[..., 0, 1], matrix[..., 1, 0] = -c.imag, c.imag
+    return matrix
