@@ -178,6 +178,16 @@ def test_wrong_matches_are_given_up_and_least_squares_follows_them() -> None:
         assert errors[1] > 0.05
 
 
+def test_a_picture_of_something_else_does_not_look_like_success() -> None:
+    """Every match wrong: some pose comes out, and its error says that it is none."""
+    rng = np.random.default_rng(11)
+    T, X, X_cam = box(60, rng)
+    uv = LENS.project(X_cam).uv[np.roll(np.arange(60), 7)]
+    found = refine_pose_robust(LENS, X, uv, T)
+    assert np.isfinite(found.T_cam_world).all()
+    assert found.rmse_px > 20  # honest ones have 0.3
+
+
 def test_tukey_alone_does_not_come_home_from_afar() -> None:
     """Why there is a first pass: beyond its cut the loss is flat."""
     rng = np.random.default_rng(6)

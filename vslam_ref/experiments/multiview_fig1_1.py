@@ -1,5 +1,7 @@
 """Figure 1.1 drawn from a real reconstruction, and what must be true of it.
 
+Implements A fig 1.1.
+
 The report's figure is a sketch: cameras C_i, points X_j, rays between them.  Here the cameras are those of a
 robot gantry around a plaster temple, the pixels come from its pictures, and the points are triangulated.
 Each camera is also left out and found again from the points that the others made, from a perturbed start,
