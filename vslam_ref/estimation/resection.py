@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.estimation.least_squares import Options, Solution, minimise
 from vslam_ref.estimation.robust import Loss, norm_scale, tuned
-from vslam_ref.geometry import se3
+from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry._arrays import Array, as_array
 from vslam_ref.geometry.cameras import Camera
-from vslam_ref.geometry.multiview.resection import resect_linear
+from vslam_ref.geometry.multiview.resection import resect_linear, tilted_twin
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,9 @@ class Resection:
         Empty if it converged and all is well; else what is wrong.
     solution : Solution or None
         The solver's own record, with the history; None where it never ran.
+    rival : float
+        For points of a plane, cost of the other tilt over this one's; near 1 the tilt is a guess.  Infinite
+        if there is no other valley.
     """
 
     T_cam_world: Array
@@ -54,6 +57,7 @@ class Resection:
     converged: bool
     reason: str
     solution: Solution | None
+    rival: float = np.inf
 
     @property
     def inliers(self) -> NDArray[np.bool_]:
@@ -169,7 +173,8 @@ def resect(
     """Pose from points and pixels without a start: linear equations, then :func:`refine_pose`.
 
     Parameters, returns and errors as for :func:`refine_pose`.  The linear start uses all points; where many
-    are wrong, choose a start from a few of them instead.
+    are wrong, choose a start from a few of them instead.  Points of a plane have two valleys: the search
+    begins in both (:func:`~vslam_ref.geometry.multiview.resection.tilted_twin`), and the deeper one counts.
 
     Examples
     --------
@@ -188,7 +193,12 @@ def resect(
     start = resect_linear(rays.bearing, X)
     if not start.ok:
         return _failed(camera, X, u, start.T_cam_world, f"no linear start: {start.reason}")
-    return refine_pose(camera, X, u, start.T_cam_world, loss=loss, sigma_px=sigma_px, options=options)
+    starts = [start.T_cam_world]
+    if start.method == "planar":
+        starts.append(tilted_twin(start.T_cam_world, X))
+    found = [refine_pose(camera, X, u, T, loss=loss, sigma_px=sigma_px, options=options) for T in starts]
+    best, *others = sorted(found, key=_cost)
+    return replace(best, rival=_rival(best, others))
 
 
 def refine_pose_robust(
@@ -241,6 +251,19 @@ def refine_pose_robust(
             return replace(found, iterations=tried, converged=False, reason=told)
         sigma, loss, T = max(scale.sigma, least_sigma_px), tuned("tukey", 2), found.T_cam_world
     return replace(found, iterations=tried)
+
+
+def _rival(best: Resection, others: list[Resection]) -> float:
+    """Cost of the next valley over the best one's; a turn of less than 1e-4 is the same valley."""
+    for other in others:
+        turn = so3.log(se3.rotation(other.T_cam_world) @ se3.rotation(best.T_cam_world).T)
+        if np.isfinite(_cost(other)) and np.linalg.norm(turn) > 1e-4:
+            return _cost(other) / _cost(best) if _cost(best) > 0 else np.inf
+    return np.inf
+
+
+def _cost(found: Resection) -> float:
+    return found.solution.cost if found.converged and found.solution is not None else np.inf
 
 
 def _result(camera: Camera, X: Array, u: Array, found: Solution) -> Resection:

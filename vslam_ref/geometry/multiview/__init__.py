@@ -26,7 +26,14 @@ from vslam_ref.geometry.multiview.epipolar import (
     sampson_distance,
 )
 from vslam_ref.geometry.multiview.point_state import PointState
-from vslam_ref.geometry.multiview.resection import LinearPose, PoseState, dlt, planar_dlt, resect_linear
+from vslam_ref.geometry.multiview.resection import (
+    LinearPose,
+    PoseState,
+    dlt,
+    planar_dlt,
+    resect_linear,
+    tilted_twin,
+)
 from vslam_ref.geometry.multiview.three_points import ThreePointPoses, p3p
 from vslam_ref.geometry.multiview.triangulation import Triangulation, triangulate, triangulate_linear
 from vslam_ref.geometry.multiview.two_view_optimum import CorrectedPair, correct_pair
@@ -54,6 +61,7 @@ __all__ = [
     "relative_motion",
     "resect_linear",
     "sampson_distance",
+    "tilted_twin",
     "triangulate",
     "triangulate_linear",
 ]

@@ -178,6 +178,37 @@ def planar_dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     return max(poses, key=lambda pose: _in_front(pose, b, X))
 
 
+def tilted_twin(T_cam_world: ArrayLike, X_world: ArrayLike) -> Array:
+    """The pose from which a small plane looks nearly the same: tilted the other way.
+
+    Implements :eq:`eq-tilted-twin`.
+    Seen from afar only what lies across the line of sight v shows.  Turn the sign of what lies along it:
+    both axes of the plane are mirrored by I - 2 v v^T, the third is their cross product, and the middle of
+    the points stays.  It is a start for a second search, no solution.
+
+    Parameters
+    ----------
+    T_cam_world : array_like, shape (4, 4)
+    X_world : array_like, shape (N, 3)
+        Points of a plane, N >= 3.
+
+    Examples
+    --------
+    >>> X = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    >>> T = se3.exp([0, 0, 8.0, 0, 0, 0]) @ se3.exp([0, 0, 0, 0.3, 0, 0])  # tilted by 0.3 about x
+    >>> np.round(se3.log(tilted_twin(T, X))[3:], 12) + 0.0
+    array([-0.3,  0. ,  0. ])
+    """
+    T, X = as_array("T_cam_world", T_cam_world, 4, 4), as_array("X_world", X_world, 3)
+    middle, _, axes, _ = _shape(X)
+    seat = se3.act(T, middle)
+    v = seat / np.linalg.norm(seat)
+    e = axes[:2] @ T[:3, :3].T  # the plane's axes in the camera, as rows
+    e = e - 2.0 * (e @ v)[:, None] * v
+    R = np.column_stack([e[0], e[1], np.cross(e[0], e[1])]) @ axes
+    return se3.from_rt(R, seat - R @ middle)
+
+
 def _best_of_three(b: Array, X: Array) -> LinearPose:
     """Of the poses of all triples the one in which all points lie best on their rays, and in front."""
     triples = np.array(list(combinations(range(len(X)), 3)))
