@@ -74,11 +74,11 @@ def test_files_that_are_none(path: Path) -> None:
     assert middlebury.read_cameras(path).T_cam_world.shape == (0, 4, 4)
 
 
-def test_thousand_mutations_give_an_answer_or_one_line(path: Path) -> None:
+def test_hundreds_of_mutations_give_an_answer_or_one_line(path: Path) -> None:
     rng = np.random.default_rng(0)
     data = TEXT.encode()
     lines = 0
-    for _ in range(1000):
+    for _ in range(300):
         bad = bytearray(data)
         for _ in range(rng.integers(1, 4)):
             at = int(rng.integers(len(bad)))
