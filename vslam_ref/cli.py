@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import NoReturn
 
 import vslam_ref
-from vslam_ref.commands import ba, bench, calibrate, data, evaluate, reproduce, warm_cache
+from vslam_ref.commands import ba, bench, calibrate, data, evaluate, grid, reproduce, vectors, verify, warm_cache
 from vslam_ref.commands import list as list_command
 from vslam_ref.commands import run as run_command
 
@@ -37,6 +37,9 @@ COMMANDS: dict[str, ModuleType] = {
     "evaluate": evaluate,
     "ba": ba,
     "calibrate": calibrate,
+    "verify": verify,
+    "vectors": vectors,
+    "grid": grid,
     "data": data,
     "bench": bench,
     "warm-cache": warm_cache,

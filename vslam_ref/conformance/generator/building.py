@@ -1,0 +1,145 @@
+"""How a file of vectors is put together."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vslam_ref.conformance.vectors_format import CONVENTION
+
+VERSION = "0.1.0"
+FORMAT = 1
+
+
+def tolerance(
+    relative: float, reason: str, *, absolute: float = 0.0, float32: float | None = None
+) -> dict[str, Any]:
+    """Tolerance of a group.
+
+    Parameters
+    ----------
+    relative : float
+        To the largest entry of the output.
+    reason : str
+        Why so much: operations times eps, condition, order of a series.
+    absolute : float
+        Added to it, for outputs that may be zero.
+    float32 : float, optional
+        The relative one in single precision; by default 2^29 times the double one, the ratio of the epsilons,
+        at most 0.01.
+    """
+    ratio = 2.0**29
+    single = {
+        "relative": min(0.01, relative * ratio) if float32 is None else float32,
+        "absolute": absolute * ratio,
+    }
+    return {"relative": relative, "absolute": absolute, "reason": reason, "float32": single}
+
+
+@dataclass
+class Topic:
+    """A file in the making.
+
+    Parameters
+    ----------
+    chapter : int
+    topic : str
+    """
+
+    chapter: int
+    topic: str
+    notes: dict[str, dict[str, str]] = field(default_factory=dict)
+    groups: list[dict[str, Any]] = field(default_factory=list)
+
+    def note(self, identity: str, meaning: str, formula: str) -> str:
+        """Explain a mistake: what a program does that gives this value, and the wrong formula."""
+        self.notes[identity] = {"meaning": meaning, "formula": formula}
+        return identity
+
+    def group(
+        self,
+        function: str,
+        equation: str,
+        oracle: str,
+        tolerance: dict[str, Any],
+        cases: list[dict[str, Any]],
+        *,
+        flags: tuple[str, ...] = (),
+        statistic: dict[str, Any] | None = None,
+    ) -> None:
+        """Add cases of one regime.
+
+        Parameters
+        ----------
+        function, equation, oracle
+            What is asked, the label of its equation, and where the expected values come from.
+        tolerance : dict
+            Of :func:`tolerance`.
+        cases : list of dict
+            ``inputs`` and ``expected``; where needed ``accept``, ``mistakes``, ``result``.
+        flags : tuple of str
+            The regime, as ``near_pi``.
+        statistic : dict, optional
+            How random answers are judged.
+        """
+        regime = "-".join(flags) or "generic"
+        stem = f"{function}/{regime}"
+        taken = sum(len(g["cases"]) for g in self.groups if g["stem"] == stem)
+        rows = [{"id": f"{stem}-{taken + k:02d}", **case} for k, case in enumerate(cases, 1)]
+        group = {
+            "stem": stem,
+            "function": function,
+            "equation": equation,
+            "oracle": oracle,
+            "flags": list(flags),
+            "tolerance": tolerance,
+            "cases": rows,
+        }
+        if statistic is not None:
+            group["statistic"] = statistic
+        self.groups.append(group)
+
+    def text(self) -> str:
+        """The file, one case a line."""
+        used = sorted({group["equation"] for group in self.groups})
+        head = {
+            "format": FORMAT,
+            "version": VERSION,
+            "chapter": self.chapter,
+            "topic": self.topic,
+            "equations": used,
+            "convention": CONVENTION,
+            "notes": self.notes,
+        }
+        lines = [json.dumps(head, indent=1)[:-2] + ","]
+        lines.append(' "groups": [')
+        for g, group in enumerate(self.groups):
+            about = {key: value for key, value in group.items() if key not in ("stem", "cases")}
+            lines.append("  " + json.dumps(plain(about))[:-1] + ', "cases": [')
+            rows = [json.dumps(plain(case)) for case in group["cases"]]
+            lines += [f"   {row}," for row in rows[:-1]] + [f"   {rows[-1]}"]
+            lines.append("  ]}" + ("," if g < len(self.groups) - 1 else ""))
+        return "\n".join([*lines, " ]", "}"]) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """Nested lists, words for numbers that are not finite, and no minus zero."""
+    if isinstance(value, dict):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        if math.isnan(value):
+            return "nan"
+        if math.isinf(value):
+            return "inf" if value > 0 else "-inf"
+        return value + 0.0
+    return value

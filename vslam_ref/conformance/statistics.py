@@ -1,0 +1,86 @@
+"""Random answers: what is measured of them, and the band it must lie in.
+
+No seed is shared with a program, so its answer cannot be compared, but its distribution can.  A case says how
+many samples to draw, what is measured, and a two-sided band with its false-alarm rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.conformance.compare import RIGHT, Difference, numbers
+from vslam_ref.conformance.vectors_format import Case
+
+Array = NDArray[np.float64]
+
+
+def mean_trace(x: Array) -> float:
+    """Mean trace of matrices (N, d, d)."""
+    return float(np.trace(x, axis1=1, axis2=2).mean())
+
+
+def mean_squared_trace(x: Array) -> float:
+    """Mean squared trace of matrices (N, d, d)."""
+    return float((np.trace(x, axis1=1, axis2=2) ** 2).mean())
+
+
+def mean_square(x: Array) -> float:
+    """Mean square of all entries."""
+    return float((x**2).mean())
+
+
+def mean_fourth(x: Array) -> float:
+    """Mean fourth power of all entries: what tells a uniform from a Gaussian distribution."""
+    return float((x**4).mean())
+
+
+def mean(x: Array) -> float:
+    """Mean of all entries."""
+    return float(x.mean())
+
+
+def worst_orthogonality(x: Array) -> float:
+    """Largest entry of R^T R - I over matrices (N, d, d)."""
+    return float(np.abs(np.swapaxes(x, 1, 2) @ x - np.eye(x.shape[-1])).max())
+
+
+MEASURES: dict[str, Callable[[Array], float]] = {
+    function.__name__: function
+    for function in (mean_trace, mean_squared_trace, mean_square, mean_fourth, mean, worst_orthogonality)
+}
+
+
+def judge(case: Case, got: dict[str, Any]) -> Difference:
+    """Measure a random answer, and compare with the band.
+
+    Parameters
+    ----------
+    case : Case
+        ``statistic`` has ``output``, ``measure``, ``samples``, ``low``, ``high``, ``false_alarm``.
+    got : dict
+        Outputs.
+    """
+    rule = case.statistic or {}
+    name = str(rule["output"])
+    if name not in got:
+        return Difference(False, name, None, "samples", float("inf"), 0.0)
+    try:
+        samples = numbers(got[name])
+    except ValueError as error:
+        return Difference(False, f"{name}: {error}", None, "samples", float("inf"), 0.0)
+    if len(np.atleast_1d(samples)) != rule["samples"] or not np.isfinite(samples).all():
+        told = f"{name}: {len(np.atleast_1d(samples))} finite samples, expected {rule['samples']}"
+        return Difference(False, told, None, None, float("inf"), 0.0)
+    try:
+        value = MEASURES[str(rule["measure"])](samples)
+    except (ValueError, IndexError) as error:
+        return Difference(False, f"{name}: {error}", list(samples.shape), None, float("inf"), 0.0)
+    low, high = float(rule["low"]), float(rule["high"])
+    if low <= value <= high:
+        return RIGHT
+    told = f"{rule['measure']} of {name} (a right program fails with probability {rule['false_alarm']:g})"
+    return Difference(False, told, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
