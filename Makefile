@@ -4,6 +4,7 @@ VENV    ?= .venv
 OUT     ?= out
 WORKERS ?= 2
 PYTEST_ARGS ?=
+FUZZ_ARGS ?=
 
 BIN    := $(VENV)/bin
 PY     := $(BIN)/python
@@ -15,11 +16,12 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow lint format notebooks notebooks-check docs docs-index bench grade clean
+.PHONY: help venv reproduce test test-slow fuzz lint format notebooks notebooks-check docs docs-index bench grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
 	@echo "make test        run the tests (make test-slow: the long ones)"
+	@echo "make fuzz        damage 10,000 files of every reader and see what it says"
 	@echo "make lint        style, types, import contracts (make format: repair the style)"
 	@echo "make notebooks   generate and execute notebooks/ from docs/chapters/"
 	@echo "make docs        build the book into $(BUILD)/html"
@@ -51,6 +53,9 @@ test: $(call DONE,fast) $(call DONE,test)
 
 test-slow: $(call DONE,fast) $(call DONE,test)
 	$(PYTEST) -m slow $(PYTEST_ARGS)
+
+fuzz: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/datasets/fuzz_readers.py $(FUZZ_ARGS)
 
 bench: $(call DONE,fast) $(call DONE,test)
 	@mkdir -p $(OUT)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +66,43 @@ def test_a_broken_archive_is_refused(tmp_path: Path, damage: object) -> None:
     path = table(tmp_path, damage(whole), "t.dat.gz")  # type: ignore[operator]
     with pytest.raises(text.FormatError, match="damaged gzip file"):
         list(text.read_lines(path))
+
+
+def test_a_message_is_one_line_that_a_person_reads_whatever_the_file_holds() -> None:
+    path = Path("a.txt")
+    raw = f"word is 'a\nb\x00\x1b[31m\u2028', {'x' * 20000}; expected a number"
+    told = f"a.txt:3: word is 'a\\nb\\x00\\x1b[31m\\u2028', {'x' * 40}…xxxx; expected a number"
+    assert str(text.FormatError(path, 3, raw)) == told
+    many = str(text.FormatError(path, None, "1 " * 1000 + "; expected fewer"))
+    assert len(many) < 420
+    assert many.startswith("a.txt: 1 1 1")
+    assert many.endswith("1 ; expected fewer")
+    assert str(text.FormatError(Path("a\nb"), None, "é fine")) == "a\\nb: é fine"
+
+
+@pytest.mark.parametrize("word", ["1_000", "١٢", "", "0x10", "1e", "½"])
+def test_what_only_python_takes_for_a_number_is_none(word: str) -> None:
+    with pytest.raises(text.FormatError, match="expected a number"):
+        text.number(Path("a"), 1, word, "x")
+
+
+def test_bzip2_is_unpacked_too(tmp_path: Path) -> None:
+    path = table(tmp_path, bz2.compress(b"1 2\n3 4\n"), "t.dat.bz2")
+    assert text.read_columns(path, NAMES).values.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    bomb = table(tmp_path, 500 * bz2.compress(b"0 0\n" * 2**18), "bomb.bz2")
+    tracemalloc.start()
+    try:
+        with pytest.raises(text.FormatError, match="more than 1000000 bytes unpacked"):
+            text.read_bytes(bomb, max_bytes=1_000_000)
+        assert tracemalloc.get_traced_memory()[1] < 2**23
+    finally:
+        tracemalloc.stop()
+
+
+def test_an_integer_that_no_double_holds_is_refused(tmp_path: Path) -> None:
+    rows = text.read_columns(table(tmp_path, "1 0\n1e16 0\n"), NAMES)
+    with pytest.raises(text.FormatError, match=r":2: time is 1e\+16; expected an integer below 9e15"):
+        text.require_integers(rows, 0, "time")
 
 
 def test_times_that_go_back_are_refused_at_their_line(tmp_path: Path) -> None:

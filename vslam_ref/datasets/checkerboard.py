@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.datasets.picture_size import require_size
 from vslam_ref.datasets.text import FormatError
 
 Array = NDArray[np.float64]
@@ -77,6 +78,7 @@ def read_grey(path: Path | str) -> GreyImage:
     path = Path(path)
     if not path.is_file():
         raise FormatError(path, None, "no such file")
+    require_size(path, MAX_PIXELS)
     with _complaints() as told:
         try:
             image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)

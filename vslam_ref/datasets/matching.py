@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.datasets.picture_size import require_size
 from vslam_ref.datasets.text import Array, FormatError
 
 IntArray = NDArray[np.int64]
 
+MAX_PIXELS = 100_000_000
 RATIO = 0.75
 """Largest ratio of the distances to the best and to the second partner."""
 
@@ -52,6 +54,7 @@ def read_grey(path: Path) -> NDArray[np.uint8]:
 
     if not path.is_file():
         raise FormatError(path, None, "no such file")
+    require_size(path, MAX_PIXELS)
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise FormatError(path, None, "not a picture that OpenCV can read; expected PNG or JPEG")

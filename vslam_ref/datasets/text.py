@@ -23,14 +23,38 @@ IntArray = NDArray[np.int64]
 MAX_BYTES = 64 * 2**20
 """Unpacked size at which reading stops; the largest known log of this kind has 3 MiB."""
 _PIECE = 2**20
+LARGEST_INTEGER = 2**53
+"""Beyond it a double does not hold every integer."""
 
 
 class FormatError(ValueError):
-    """A file is not what it should be; the message is one line, ``file:line: what; what is right``."""
+    """A file is not what it should be; the message is one line, ``file:line: what; what is right``.
+
+    It stays one line that a person reads, whatever the file holds: what cannot be printed is escaped, a word
+    of more than ``LONGEST_WORD`` characters shortened, and of a long message the middle left out.
+    """
 
     def __init__(self, path: Path, line: int | None, what: str) -> None:
         self.path, self.line = path, line
-        super().__init__(f"{path}{'' if line is None else f':{line}'}: {what}")
+        place = _printable(f"{path}{'' if line is None else f':{line}'}")
+        super().__init__(f"{place}: {_short(_printable(what))}")
+
+
+LONGEST_WORD = 60
+LONGEST_MESSAGE = 400
+"""Characters."""
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def _short(text: str) -> str:
+    """The text with its long words cut, and its middle left out if it is still too long."""
+    words = (w if len(w) <= LONGEST_WORD else f"{w[: LONGEST_WORD - 20]}…{w[-5:]}" for w in text.split(" "))
+    text = " ".join(words)
+    half = LONGEST_MESSAGE // 2
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:half]} … {text[-half:]}"
 
 
 class Columns(NamedTuple):
@@ -185,8 +209,9 @@ def require_order(table: Columns, column: int, *, strict: bool = False) -> None:
 def require_integers(table: Columns, column: int, name: str) -> IntArray:
     """Return a column as integers, or raise :class:`FormatError` at the first that is none."""
     values = table.values[:, column]
-    bad = np.flatnonzero(values != np.round(values))
+    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) >= LARGEST_INTEGER))
     if len(bad):
         at = int(bad[0])
-        raise FormatError(table.path, int(table.lines[at]), f"{name} is {values[at]:g}; expected an integer")
+        right = "an integer" if abs(values[at]) < LARGEST_INTEGER else "an integer below 9e15"
+        raise FormatError(table.path, int(table.lines[at]), f"{name} is {values[at]:g}; expected {right}")
     return values.astype(np.int64)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.datasets import matfile
 from vslam_ref.datasets.mrclam import group_sightings
-from vslam_ref.datasets.text import Array, FormatError, IntArray, number, read_lines
+from vslam_ref.datasets.text import LARGEST_INTEGER, Array, FormatError, IntArray, number, read_lines
 from vslam_ref.systems.slam_log.log import SlamLog, Truth
 
 WHEELBASE = 2.83
@@ -165,8 +165,8 @@ def _values(path: Path, line: int, words: list[str], names: tuple[str, ...], ext
         raise FormatError(path, line, what)
     values = [number(path, line, word, name) for word, name in zip(words, names, strict=False)]
     for value, name in zip(values[:2], names, strict=False):
-        if value != round(value) or value < 0:
-            raise FormatError(path, line, f"{name} is {value:g}; expected a whole number, 0 or more")
+        if value != round(value) or not 0 <= value < LARGEST_INTEGER:
+            raise FormatError(path, line, f"{name} is {value:g}; expected a whole number from 0 to 9e15")
     for word in words[len(names) :]:
         number(path, line, word, "noise")
     return values

@@ -96,8 +96,9 @@ def read_libmv(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
 def _intrinsics(path: Path, data: bytes, order: str, space: str) -> tuple[Array, list[str]]:
     """Parameters (9,) in our order, and what there is to say about them."""
     require_room(path, None, "the intrinsics", 2 + 4 * len(INTRINSICS), len(data))
-    given = np.frombuffer(data, f"{order}f4", len(INTRINSICS), 2).astype(np.float64)
-    _require_numbers(path, given, "intrinsics")
+    stored = np.frombuffer(data, f"{order}f4", len(INTRINSICS), 2)
+    _require_numbers(path, stored, "intrinsics")
+    given = stored.astype(np.float64)
     if space == "normalised":
         f = [1.0] + 7 * [0.0]
         told = (
@@ -133,10 +134,11 @@ def _part(path: Path, data: bytes, at: int, order: str, name: str) -> tuple[NDAr
 
 
 def _require_numbers(path: Path, values: NDArray[Any], name: str) -> None:
-    bad = np.argwhere(~(np.abs(values) < FARTHEST))
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        bad = np.argwhere(~(np.abs(values) < FARTHEST))
     if len(bad):
         told = f"{name} {bad[0][0]}" if values.ndim > 1 else name
-        shown = float(values[tuple(bad[0])])
+        shown = values[tuple(bad[0])].item()
         raise FormatError(path, None, f"{told} has the number {shown:g}; expected finite ones below 1e15")
 
 

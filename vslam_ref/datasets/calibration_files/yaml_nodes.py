@@ -16,6 +16,7 @@ from vslam_ref.datasets.text import FormatError, number
 
 Array = NDArray[np.float64]
 MAX_BYTES = 2**20
+LONGEST = 1e12
 MAX_DEPTH = 32
 """Calibration files are flat and short: what is larger or deeper is something else."""
 
@@ -168,10 +169,14 @@ def rigid(node: Node, T: Array) -> Array:
     if T.shape != (4, 4):
         raise node.error(f"{node.name} is {T.shape[0]} x {T.shape[1]}; expected 4 x 4")
     R = T[:3, :3]
-    if not np.allclose(R @ R.T, np.eye(3), atol=1e-4) or np.linalg.det(R) < 0:
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation either
+        is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0
+    if not is_rotation:
         raise node.error(f"{node.name} is no rigid motion; expected a rotation in its upper left 3 x 3")
     if not np.allclose(T[3], [0, 0, 0, 1], atol=1e-9):
         raise node.error(f"last row of {node.name} is {T[3].tolist()}; expected [0, 0, 0, 1]")
+    if not (np.abs(T[:3, 3]) < LONGEST).all():
+        raise node.error(f"{node.name} moves by {T[:3, 3].tolist()} m; expected less than {LONGEST:g}")
     return T
 
 
