@@ -1,0 +1,139 @@
+"""A map as a likelihood field: how far each place is from the nearest static cell.
+
+A reading whose end lies at distance d from what is static has the likelihood exp(-d^2 / 2 sigma^2),
+whatever the beam passed on its way (Thrun's "likelihood field").  Between the cells' middles the distance
+is interpolated, bilinearly, so that it has a slope.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref.geometry import se2
+from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DistanceField:
+    """Distances to the nearest static cell.
+
+    Parameters
+    ----------
+    origin_xy : tuple of two floats
+        Lower left corner of cell [0, 0], metres.
+    resolution : float
+        Side of a cell, metres.
+    distance : ndarray, shape (rows, columns)
+        At the cells' middles, metres, at most ``most``.
+    most : float
+        Value outside, and where nothing is near.
+    """
+
+    origin_xy: tuple[float, float]
+    resolution: float
+    distance: Array
+    most: float
+
+
+class Sampled(NamedTuple):
+    """Value (n,) of a field at points, and its Jacobian (n, 2) in the point."""
+
+    value: Array
+    J_point: Array
+
+
+class Residuals(NamedTuple):
+    """Value (n,) of scan points' distances, and its Jacobian (n, 3) in the pose's (x, y, theta)."""
+
+    value: Array
+    J_pose: Array
+
+
+def distance_field(grid: LogOddsGrid, most: float = 0.5) -> DistanceField:
+    """Distances to the nearest cell that the map has decided to be occupied.
+
+    Parameters
+    ----------
+    grid : LogOddsGrid
+        S, or a plain grid.
+    most : float
+        Distances are cut here, metres.
+
+    Raises
+    ------
+    ValueError
+        If ``most`` is not positive and finite.
+    """
+    if not (np.isfinite(most) and most > 0):
+        raise ValueError(f"most={most!r} m: must be positive and finite")
+    occupied = grid.states == OCCUPIED
+    if not occupied.any():
+        return DistanceField(grid.origin_xy, grid.resolution, np.full(occupied.shape, most), most)
+    from scipy.ndimage import distance_transform_edt
+
+    distance = grid.resolution * distance_transform_edt(~occupied)
+    return DistanceField(grid.origin_xy, grid.resolution, np.minimum(distance, most), most)
+
+
+def sample(field: DistanceField, points: ArrayLike) -> Array:
+    """Distances (n,) at points (n, 2) of the world, metres.
+
+    Examples
+    --------
+    >>> field = DistanceField((0.0, 0.0), 1.0, np.array([[0.0, 1.0], [1.0, 1.4]]), 5.0)
+    >>> sample(field, [[0.5, 0.5], [1.0, 0.5], [9.0, 0.5]])
+    array([0. , 0.5, 5. ])
+    """
+    return sample_with_jacobians(field, points).value
+
+
+def sample_with_jacobians(field: DistanceField, points: ArrayLike) -> Sampled:
+    """:func:`sample` and its slope; same parameters.  Outside the slope is 0."""
+    p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    rows, columns = field.distance.shape
+    at = (p - field.origin_xy) / field.resolution - 0.5
+    column, row = np.floor(at).astype(np.int64).T
+    inside = (column >= 0) & (column < columns - 1) & (row >= 0) & (row < rows - 1)
+    i, j = np.where(inside, row, 0), np.where(inside, column, 0)
+    u, v = at[:, 0] - column, at[:, 1] - row
+    if rows < 2 or columns < 2:
+        return Sampled(np.full(len(p), field.most), np.zeros((len(p), 2)))
+    d = field.distance
+    d00, d01, d10, d11 = d[i, j], d[i, j + 1], d[i + 1, j], d[i + 1, j + 1]
+    value = (1 - v) * ((1 - u) * d00 + u * d01) + v * ((1 - u) * d10 + u * d11)
+    slope = np.stack([(1 - v) * (d01 - d00) + v * (d11 - d10), (1 - u) * (d10 - d00) + u * (d11 - d01)], 1)
+    return Sampled(
+        np.where(inside, value, field.most), np.where(inside[:, None], slope / field.resolution, 0.0)
+    )
+
+
+def scan_residuals(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Array:
+    """Distances (n,) of scan points from what is static.
+
+    Implements :eq:`eq-field-residual`.
+
+    Parameters
+    ----------
+    pose : array_like, shape (3,)
+        ``T_world_laser`` as (x, y, theta).
+    points : array_like, shape (n, 2)
+        In the laser's frame, metres.
+    field : DistanceField
+    """
+    return scan_residuals_with_jacobians(pose, points, field).value
+
+
+def scan_residuals_with_jacobians(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Residuals:
+    """:func:`scan_residuals` and its Jacobian in (x, y, theta), the filter's coordinates; same parameters."""
+    pose, points = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    world = se2.act(pose, points)
+    at = sample_with_jacobians(field, world)
+    lever = world - pose[:2]
+    turn = -at.J_point[:, 0] * lever[:, 1] + at.J_point[:, 1] * lever[:, 0]
+    return Residuals(at.value, np.column_stack([at.J_point, turn]))

@@ -1,0 +1,297 @@
+"""The third map: landmarks, how they are chosen, and how a bad choice is found out.
+
+::
+
+    corner seen --> candidate --(seen again 'confirm' times)--> static? apart? --> landmark
+                                                                                      |
+        withdrawn <--(beams go through it, or S no longer holds it)-------------------'
+
+A landmark is chosen only where S is static: both arms decided, and a corner of S near.  Beside a landmark
+that looks the same no second one is set: the two would be mistaken for each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref.geometry import se2, so2
+from vslam_ref.grids.landmarks.association import TURN, Signature, look_alike
+from vslam_ref.grids.landmarks.lines import Corners
+from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, map_corners, static_along_arms
+from vslam_ref.grids.log_odds import LogOddsGrid
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+Why = Literal["", "seen through", "no longer static in S"]
+
+
+@dataclass(frozen=True)
+class LandmarkConfig:
+    """How landmarks are chosen and withdrawn; every field says why it has its value."""
+
+    static_only: bool = field(default=True, metadata={"reason": "A4.4: landmarks must be taken from S"})
+    withdraw: bool = field(
+        default=True, metadata={"reason": "what was static when chosen may be moved later"}
+    )
+    confirm: int = field(
+        default=5, metadata={"reason": "a second of scans; noise makes no corner five times"}
+    )
+    same: float = field(
+        default=0.12, metadata={"reason": "a candidate seen again; four sigma of a corner", "unit": "m"}
+    )
+    forget: int = field(
+        default=10, metadata={"reason": "two seconds unseen: the candidate was none", "unit": "scans"}
+    )
+    apart: float = field(
+        default=0.6, metadata={"reason": "look-alikes nearer than a gate's width", "unit": "m"}
+    )
+    corner_of_s: float = field(
+        default=0.3, metadata={"reason": "three cells from a corner of S", "unit": "m"}
+    )
+    arms: float = field(default=0.8, metadata={"reason": "share of both arms decided static by S"})
+    arms_left: float = field(default=0.3, metadata={"reason": "below it S has taken the walls away"})
+    beyond: float = field(
+        default=0.25, metadata={"reason": "a beam that ends this far behind went through", "unit": "m"}
+    )
+    through: int = field(
+        default=3, metadata={"reason": "three scans running: noise does not", "unit": "scans"}
+    )
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if min(self.confirm, self.forget, self.through) < 1:
+            raise ValueError("confirm, forget and through: need at least 1")
+        if not (self.same > 0 and self.apart >= 0 and self.corner_of_s > 0 and self.beyond > 0):
+            raise ValueError("need same, corner_of_s, beyond > 0 and apart >= 0")
+        if not 0 <= self.arms_left <= self.arms <= 1:
+            raise ValueError(
+                f"arms_left={self.arms_left}, arms={self.arms}: need 0 <= arms_left <= arms <= 1"
+            )
+
+
+@dataclass(eq=False)
+class Landmark:
+    """What is kept of a landmark beside its place, which the filter holds.
+
+    Attributes
+    ----------
+    id : int
+        Its number in the filter; never used again after it was withdrawn.
+    bisector, opening : float
+        In the world, radians.
+    convex : bool
+    arms : ndarray, shape (2,)
+        Directions of the arms in the world, radians.
+    born : int
+        Scan at which it was chosen.
+    seen, through : int
+        Updates so far; scans running in which beams went through it.
+    withdrawn : int or None
+        Scan at which it was withdrawn.
+    why : str
+    """
+
+    id: int
+    bisector: float
+    opening: float
+    convex: bool
+    arms: Array
+    born: int
+    seen: int = 0
+    through: int = 0
+    withdrawn: int | None = None
+    why: Why = ""
+
+
+@dataclass(eq=False)
+class _Candidate:
+    xy: Array
+    bisector: float
+    opening: float
+    convex: bool
+    count: int
+    last: int
+
+
+class Chosen(NamedTuple):
+    """New landmarks: index of the corner (k,) that shows each, and their numbers (k,)."""
+
+    corner: IntArray
+    id: IntArray
+
+
+@dataclass
+class LandmarkMap:
+    """All landmarks, and the corners that may become some."""
+
+    config: LandmarkConfig = field(default_factory=LandmarkConfig)
+    of_s: MapCornerConfig = field(default_factory=MapCornerConfig)
+    landmarks: list[Landmark] = field(default_factory=list)
+    _candidates: list[_Candidate] = field(default_factory=list)
+
+    @property
+    def active(self) -> list[Landmark]:
+        """Landmarks in use, in the order of their numbers."""
+        return [m for m in self.landmarks if m.withdrawn is None]
+
+    def signature(self) -> Signature:
+        """Signatures of the active landmarks, in the world."""
+        return signature_of(self.active)
+
+    def choose(
+        self,
+        scan: int,
+        pose: ArrayLike,
+        corners: Corners,
+        unclaimed: BoolArray,
+        places: Array,
+        static: LogOddsGrid,
+    ) -> Chosen:
+        """Remember unclaimed corners, and make landmarks of those that were seen often enough.
+
+        Parameters
+        ----------
+        scan : int
+            Number of this scan.
+        pose : array_like, shape (3,)
+            ``T_world_laser``.
+        corners : Corners
+            Of this scan, in the laser's frame.
+        unclaimed : ndarray of bool, shape (m,)
+            Corners that no landmark's gate holds.
+        places : ndarray, shape (n, 2)
+            Where the active landmarks are, world, metres.
+        static : LogOddsGrid
+            S (or whatever map stands in for it).
+        """
+        c, pose = self.config, np.asarray(pose, dtype=np.float64)
+        self._candidates = [k for k in self._candidates if scan - k.last <= c.forget]
+        ripe = []
+        for i in np.flatnonzero(unclaimed).tolist():
+            xy = se2.act(pose, corners.xy[i])
+            bisector = float(so2.wrap(pose[2] + corners.bisector[i]))
+            candidate = self._seen_again(
+                xy, bisector, float(corners.opening[i]), bool(corners.convex[i]), scan
+            )
+            if candidate.count >= c.confirm:
+                ripe.append((i, candidate))
+        if not ripe:
+            return Chosen(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        rows = np.array([i for i, _ in ripe])
+        arms = so2.wrap(pose[2] + corners.arms[rows])
+        good = self._static(static, np.stack([k.xy for _, k in ripe]), arms)
+        new: list[tuple[int, int]] = []
+        known = [(p, m) for p, m in zip(places, self.active, strict=True)]
+        for (i, candidate), direction, is_static in zip(ripe, arms, good, strict=True):
+            if not bool(is_static) or self._too_near(candidate, known):
+                continue
+            mark = Landmark(
+                len(self.landmarks), candidate.bisector, candidate.opening, candidate.convex, direction, scan
+            )
+            self.landmarks.append(mark)
+            known.append((candidate.xy, mark))
+            self._candidates = [k for k in self._candidates if k is not candidate]
+            new.append((i, mark.id))
+        pairs = np.array(new, dtype=np.int64).reshape(-1, 2)
+        return Chosen(pairs[:, 0], pairs[:, 1])
+
+    def _seen_again(self, xy: Array, bisector: float, opening: float, convex: bool, scan: int) -> _Candidate:
+        for k in self._candidates:
+            near = np.hypot(*(k.xy - xy)) <= self.config.same and abs(so2.wrap(k.bisector - bisector)) < TURN
+            if near and k.convex == convex and k.last < scan:
+                k.xy = xy
+                k.count, k.last = k.count + 1, scan
+                return k
+        self._candidates.append(_Candidate(xy, bisector, opening, convex, 1, scan))
+        return self._candidates[-1]
+
+    def _static(self, static: LogOddsGrid, xy: Array, arms: Array) -> BoolArray:
+        """Whether S holds these corners: static along both arms, and a corner of S near."""
+        if not self.config.static_only:
+            return np.ones(len(xy), dtype=bool)
+        along = static_along_arms(static, xy, arms) >= self.config.arms
+        if not along.any():
+            return along
+        corners = map_corners(static, self.of_s).xy
+        if len(corners) == 0:
+            return np.zeros(len(xy), dtype=bool)
+        off = xy[:, None] - corners
+        near: BoolArray = np.hypot(off[..., 0], off[..., 1]).min(axis=1) <= self.config.corner_of_s
+        return along & near
+
+    def _too_near(self, candidate: _Candidate, known: list[tuple[Array, Landmark]]) -> bool:
+        """Whether a landmark that looks alike lies nearer than ``apart``."""
+        near = [m for p, m in known if np.hypot(*(p - candidate.xy)) < self.config.apart]
+        own = Signature(
+            np.array([candidate.bisector]), np.array([candidate.opening]), np.array([candidate.convex])
+        )
+        return bool(near) and bool(look_alike(own, signature_of(near)).any())
+
+    def check(
+        self, scan: int, pose: ArrayLike, places: Array, angles: Array, ranges: Array, static: LogOddsGrid
+    ) -> list[Landmark]:
+        """Withdraw landmarks that this scan goes through, or that S no longer holds; return them.
+
+        Parameters
+        ----------
+        scan, pose, places, static
+            As for :meth:`choose`.
+        angles, ranges : ndarray, shape (b,)
+            The scan; readings that are not finite count as nothing seen.
+        """
+        active = self.active
+        if not self.config.withdraw or not active:
+            return []
+        arms = np.stack([m.arms for m in active])
+        through = seen_through(pose, places, arms, angles, ranges, self.config.beyond)
+        held = static_along_arms(static, places, arms) >= self.config.arms_left
+        gone = []
+        for m, went, holds in zip(active, through, held, strict=True):
+            m.through = m.through + 1 if bool(went) else 0
+            if m.through >= self.config.through:
+                m.withdrawn, m.why = scan, "seen through"
+            elif self.config.static_only and not holds:
+                m.withdrawn, m.why = scan, "no longer static in S"
+            if m.withdrawn is not None:
+                gone.append(m)
+        return gone
+
+
+def signature_of(landmarks: list[Landmark]) -> Signature:
+    """Signatures of landmarks, in the world."""
+    return Signature(
+        np.array([m.bisector for m in landmarks]),
+        np.array([m.opening for m in landmarks]),
+        np.array([m.convex for m in landmarks], dtype=bool),
+    )
+
+
+def seen_through(
+    pose: ArrayLike, places: ArrayLike, arms: ArrayLike, angles: ArrayLike, ranges: ArrayLike, beyond: float,
+    along: float = 0.15,
+) -> BoolArray:  # fmt: skip
+    """Whether beams went through both arms of corners (n,).
+
+    A beam past the edge of a cupboard touches nothing, so the corner itself proves nothing: looked at is a
+    place on each arm, ``along`` metres from the corner.  All readings within one beam of its direction
+    must end at least ``beyond`` metres behind it.  A reading in front of it (somebody stands there) says
+    nothing.
+    """
+    pose, angles = np.asarray(pose, dtype=np.float64), np.asarray(angles, dtype=np.float64)
+    ranges, arms = np.asarray(ranges, dtype=np.float64), np.asarray(arms, dtype=np.float64).reshape(-1, 2)
+    places = np.asarray(places, dtype=np.float64).reshape(-1, 2)
+    spots = places[:, None] + along * np.stack([np.cos(arms), np.sin(arms)], -1)
+    seen = se2.act(se2.inverse(pose), spots)
+    distance, bearing = np.hypot(seen[..., 0], seen[..., 1]), np.arctan2(seen[..., 1], seen[..., 0])
+    width = 1.5 * (angles[1] - angles[0]) if len(angles) > 1 else 0.0
+    through: BoolArray = np.zeros(distance.shape, dtype=np.bool_)
+    usable = np.isfinite(ranges) & (ranges > 0)
+    for i in np.ndindex(distance.shape):
+        beside = usable & (np.abs(so2.wrap(angles - bearing[i])) <= width)
+        through[i] = beside.sum() >= 2 and bool(ranges[beside].min() > distance[i] + beyond)
+    return np.asarray(through.all(axis=-1))

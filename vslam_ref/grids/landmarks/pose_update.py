@@ -1,0 +1,72 @@
+"""A scan's word on the pose, given to a filter that also holds landmarks.
+
+A match yields information A on the pose, perhaps singular (along a corridor).  In the eigenvectors of A
+the known directions are ordinary measurements with variances 1/eigenvalue; the unknown ones are left out.
+The landmarks move with the pose through their cross covariances, as in any EKF update.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vslam_ref.filters.block_covariance import Blocks, move_means, whitened
+from vslam_ref.geometry import so2
+
+Array = NDArray[np.float64]
+
+WEAKEST = 1e-6
+"""Eigenvalues below this share of the largest say nothing."""
+
+
+def pose_measurement(
+    pose: ArrayLike, information: ArrayLike, predicted: ArrayLike, cov: ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Turn a match into a linear measurement H x = z with independent errors.
+
+    A match maximises prediction times likelihood, so that at its pose x, with the prediction's P,
+    A (z - x) = P^-1 (x - predicted): the likelihood's own maximum z lies beyond x, seen from the prediction.
+
+    Parameters
+    ----------
+    pose : array_like, shape (3,)
+        Most probable pose x.
+    information : array_like, shape (3, 3)
+        A, of the scan alone.
+    predicted, cov : array_like, shapes (3,), (3, 3)
+        The prediction.
+
+    Returns
+    -------
+    H : ndarray, shape (k, 3)
+        Known directions, k <= 3.
+    innovation : ndarray, shape (k,)
+        H (z - predicted).
+    variance : ndarray, shape (k,)
+    """
+    A, P = np.asarray(information, dtype=np.float64), np.asarray(cov, dtype=np.float64)
+    off = np.asarray(pose, dtype=np.float64) - np.asarray(predicted, dtype=np.float64)
+    off[2] = so2.wrap(off[2])
+    values, vectors = np.linalg.eigh((A + A.T) / 2)
+    known = values > WEAKEST * max(float(values.max()), 0.0)
+    known &= values > 0.0
+    H = vectors[:, known].T
+    pull = H @ np.linalg.solve(P, off)
+    return H, H @ off + pull / values[known], 1.0 / values[known]
+
+
+def pose_update(blocks: Blocks, H: ArrayLike, innovation: ArrayLike, variance: ArrayLike) -> None:
+    """Kalman update of pose and landmarks, in place, by H (k, 3) on the pose of one run (a batch of 1)."""
+    H, innovation = np.asarray(H, dtype=np.float64)[None], np.asarray(innovation, dtype=np.float64)[None]
+    if H.shape[1] == 0:
+        return
+    b = blocks
+    HP = H @ np.concatenate([b.P_pp, b.P_pm], axis=2)
+    S = HP[:, :, :3] @ H.swapaxes(1, 2) + np.diag(np.asarray(variance, dtype=np.float64))
+    W, y = whitened(HP, innovation, S)
+    move_means(b.x_p, b.x_m, W, y)
+    WW = W.swapaxes(1, 2) @ W
+    b.P_pp -= WW[:, :3, :3]
+    b.P_pm -= WW[:, :3, 3:]
+    b.P_mm -= WW[:, 3:, 3:]
+    b.x_p[:, 2] = so2.wrap(b.x_p[:, 2])
