@@ -264,6 +264,14 @@ def test_twin_does_what_numpy_does(twin: str, build: Callable[..., tuple[Any, ..
     assert changed > 0 or also, "an in-place function that changes nothing was not tested"
 
 
+@pytest.mark.parametrize("n", [150, 151])
+@pytest.mark.parametrize("build", [for_landmark_update, for_ekf_update, for_reduced_update])
+def test_a_map_wider_than_a_tile(build: Callable[..., tuple[Any, ...]], n: int) -> None:
+    """The update kernels take P_mm tile by tile of 256 columns: here there are two or three."""
+    (twin,) = (t for t, builders in INPUTS.items() if build in builders)
+    test_twin_does_what_numpy_does(twin, build, 1, n)
+
+
 @pytest.mark.parametrize(("twin", "build"), CASES, ids=[f"{t}-{b.__name__}" for t, b in CASES])
 def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, ...]]) -> None:
     """The tolerance has teeth: perturbing one input by 1e-6 shows, in at least one output."""
