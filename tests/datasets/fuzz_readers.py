@@ -36,7 +36,9 @@ from reader_samples import SAMPLES, Sample, reader
 from vslam_ref.datasets.text import FormatError
 
 LIMIT = 5.0
-"""Seconds for one small file."""
+"""Seconds for one small file, by the clock: then it is stopped."""
+PROCESSOR = 1.0
+"""Seconds for one small file of the processor's time, which a busy machine does not lengthen."""
 LONGEST_MESSAGE = 600
 """Characters of a message beside the file's name: a line that a person reads."""
 
@@ -79,6 +81,7 @@ def judge(name: str, sample: Sample, folder: Path) -> tuple[str, str]:
     """Read the files of a folder: ("record" or "refused" or "defect", and what the defect is)."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        begin = time.process_time()
         try:
             with time_limit(LIMIT):
                 record = reader(name)(*sample.given(folder))
@@ -92,6 +95,9 @@ def judge(name: str, sample: Sample, folder: Path) -> tuple[str, str]:
             return "defect", f"{type(error).__name__} at {place}: {' '.join(str(error).split())[:200]}"
         else:
             verdict, told = "record", sample.wrong(record)
+    taken = time.process_time() - begin
+    if taken > PROCESSOR:
+        told = f"took {taken:.1f} s of the processor"
     if not told and caught:
         told = f"warns: {caught[0].category.__name__}: {caught[0].message}"
     return ("defect", told) if told else (verdict, "")

@@ -143,6 +143,18 @@ def test_a_reader_that_hangs_is_a_defect(tmp_path: Path, monkeypatch: pytest.Mon
     assert toy(tmp_path, monkeypatch, hang) == ("defect", "took more than 0.1 s")
 
 
+def test_a_reader_that_computes_too_long_is_a_defect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow(path: Path) -> None:
+        begin = time.process_time()
+        while time.process_time() < begin + 0.05:
+            pass
+
+    monkeypatch.setattr(fuzz_readers, "PROCESSOR", 0.02)
+    verdict, told = toy(tmp_path, monkeypatch, slow)
+    assert verdict == "defect"
+    assert told.endswith("s of the processor")
+
+
 # --- the mutations -----------------------------------------------------------------------------------
 
 

@@ -147,3 +147,9 @@ def test_the_fifteen_problems() -> None:
         assert np.sum(r**2) == pytest.approx(p.residual_sum_of_squares, rel=1e-8, abs=1e-20), name
         spread = np.sqrt(p.residual_sum_of_squares / (len(p.y) - len(p.certified)))
         assert spread == pytest.approx(p.residual_deviation, rel=1e-9)
+
+
+def test_a_line_without_end_is_refused_and_not_searched(toy: Path) -> None:
+    toy.write_text(SMALL.replace("Lower", "x" * 100_000))
+    with pytest.raises(FormatError, match=r":6: a line of 100\d{3} characters; expected at most 500"):
+        nist.read_problem(toy)

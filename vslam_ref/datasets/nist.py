@@ -25,6 +25,9 @@ from vslam_ref.datasets.text import Array, FormatError, number, read_lines
 MAX_BYTES = 2**20
 """The largest of the 27 files of the collection has 0.2 MiB."""
 
+LONGEST_LINE = 500
+"""The longest of the files known here has 71 characters; searching takes the square of a line's length."""
+
 Lines = dict[int, str]
 
 
@@ -76,6 +79,10 @@ def read_problem(path: Path) -> NistProblem:
     if not path.is_file():
         raise FormatError(path, None, "no such file")
     lines = dict(read_lines(path, MAX_BYTES))
+    for at, text in lines.items():
+        if len(text) > LONGEST_LINE:
+            told = f"a line of {len(text)} characters; expected at most {LONGEST_LINE}"
+            raise FormatError(path, at, told)
     _, title = _find(path, lines, r"Dataset Name:\s*(\S+)")
     begin, end = _places(path, lines, "Starting Values")
     values = np.array([_values(path, lines, i, i - begin + 1) for i in range(begin, end + 1)])
