@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.vectors_format import Case
 
 Array = NDArray[np.float64]
@@ -53,9 +55,9 @@ def numbers(value: Any) -> Array:
 def compare(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Difference:
     """Compare an answer with the expected one, and with others that are as right."""
     tolerance = _tolerance(case, profile)
-    first = RIGHT
+    first, kinds = RIGHT, functions()[case.function].outputs
     for number, expected in enumerate([case.expected, *case.accept]):
-        found = _outputs(expected, got, tolerance)
+        found = _outputs(expected, got, tolerance, kinds)
         if found.right:
             return found
         first = found if number == 0 else first
@@ -65,7 +67,8 @@ def compare(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Di
 def matches(answer: dict[str, Any], got: dict[str, Any], case: Case, profile: Profile = "float64") -> bool:
     """Whether an answer is that of a wrong formula, within ten times the tolerance."""
     relative, absolute = _tolerance(case, profile)
-    return _outputs(answer, got, (10 * relative, 10 * absolute)).right
+    kinds = functions()[case.function].outputs
+    return _outputs(answer, got, (10 * relative, 10 * absolute), kinds).right
 
 
 def _tolerance(case: Case, profile: Profile) -> tuple[float, float]:
@@ -73,14 +76,45 @@ def _tolerance(case: Case, profile: Profile) -> tuple[float, float]:
     return float(rule["relative"]), float(rule["absolute"])
 
 
-def _outputs(expected: dict[str, Any], got: dict[str, Any], tolerance: tuple[float, float]) -> Difference:
+def _outputs(
+    expected: dict[str, Any], got: dict[str, Any], tolerance: tuple[float, float], kinds: Mapping[str, str]
+) -> Difference:
     for name, value in expected.items():
         if name not in got:
             return Difference(False, name, None, value, float("inf"), 0.0)
-        found = _value(name, value, got[name], tolerance)
+        found = _value(name, *_prepared(kinds.get(name, "plain"), value, got[name]), tolerance)
         if not found.right:
             return found
     return RIGHT
+
+
+def _prepared(kind: str, expected: Any, got: Any) -> tuple[Any, Any]:
+    """What is compared: a set in the order of the expected one, the numbers of a table's text."""
+    if kind == "poses":
+        return expected, _in_order(expected, got)
+    if kind == "table" and isinstance(expected, str) and isinstance(got, str):
+        return _table(expected), _table(got)
+    return expected, got
+
+
+def _in_order(expected: Any, got: Any) -> Any:
+    """Members of a set, each beside the nearest expected one that is still free."""
+    try:
+        want, have = numbers(expected), list(numbers(got))
+    except ValueError:
+        return got
+    if want.ndim < 2 or len(have) != len(want) or any(member.shape != want.shape[1:] for member in have):
+        return got
+    return [have.pop(int(np.argmin([np.abs(member - x).max() for member in have]))) for x in want]
+
+
+def _table(text: str) -> list[list[float]] | str:
+    """Rows of numbers of a text without its comments; the text itself where a word is no number."""
+    lines = (line.partition("#")[0].replace(",", " ").split() for line in text.splitlines())
+    try:
+        return [[float(word) for word in words] for words in lines if words]
+    except ValueError:
+        return text
 
 
 def _value(where: str, expected: Any, got: Any, tolerance: tuple[float, float]) -> Difference:
@@ -92,7 +126,7 @@ def _value(where: str, expected: Any, got: Any, tolerance: tuple[float, float]) 
         for step, (want, have) in enumerate(zip(expected, got, strict=True)):
             if not isinstance(have, dict):
                 return Difference(False, f"step {step}", have, want, float("inf"), 0.0)
-            found = _outputs(want, have, tolerance)
+            found = _outputs(want, have, tolerance, {})
             if not found.right:
                 return found._replace(where=f"step {step}, {found.where}")
         return RIGHT

@@ -82,7 +82,7 @@ class Convention:
         if self._unchanged(kind):
             return value
         x = numbers(value)
-        if kind == "pose":
+        if kind in ("pose", "poses"):
             return se3.inverse(x).tolist()
         if kind == "quaternion":
             return x[..., [1, 2, 3, 0]].tolist()
@@ -108,7 +108,7 @@ class Convention:
         if self._unchanged(kind):
             return value
         x = numbers(value)
-        if kind == "pose":
+        if kind in ("pose", "poses"):
             return se3.inverse(x).tolist()
         if kind == "quaternion":
             return x[..., [3, 0, 1, 2]].tolist()
@@ -133,6 +133,7 @@ class Convention:
         plain = Convention()
         same = {
             "pose": self.transform == plain.transform,
+            "poses": self.transform == plain.transform,
             "quaternion": self.quaternion_order == plain.quaternion_order,
             "pixel": self.pixel_origin == plain.pixel_origin,
             "intrinsics": self.pixel_origin == plain.pixel_origin,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.compare import Profile, compare, matches, numbers
 from vslam_ref.conformance.conventions import ROTATION_FIRST, ROTATION_FIRST_SIM3
+from vslam_ref.conformance.statistics import mistaken
 from vslam_ref.conformance.vectors_format import Case, VectorFile
 
 Array = NDArray[np.float64]
@@ -68,9 +69,8 @@ def diagnose(file: VectorFile, case: Case, got: Any, profile: Profile = "float64
     """
     if not isinstance(got, dict):
         return ""
-    for note, answer in case.mistakes.items():
-        if matches(answer, got, case, profile):
-            return f"{note}: {file.notes[note]['meaning']}"
+    if known := known_mistake(file, case, got, profile):
+        return known
     function = functions()[case.function]
     if case.statistic is not None or len(function.outputs) > 2:
         return ""
@@ -80,6 +80,14 @@ def diagnose(file: VectorFile, case: Case, got: Any, profile: Profile = "float64
             if turned is not None and compare(case, turned, profile).right:
                 return f"{name}: {sentence}"
     return ""
+
+
+def known_mistake(file: VectorFile, case: Case, got: dict[str, Any], profile: Profile = "float64") -> str:
+    """The note of the wrong formula that gives this answer, or an empty sentence."""
+    found = mistaken(case, got)
+    for note, answer in case.mistakes.items():
+        found = found or (note if matches(answer, got, case, profile) else "")
+    return f"{found}: {file.notes[found]['meaning']}" if found else ""
 
 
 def _turned(

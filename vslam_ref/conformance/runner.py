@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -10,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.compare import Difference, Profile, compare
 from vslam_ref.conformance.conventions import Convention
-from vslam_ref.conformance.diagnose import diagnose
+from vslam_ref.conformance.diagnose import diagnose, known_mistake
 from vslam_ref.conformance.program import Asked, Reply
 from vslam_ref.conformance.statistics import judge
 from vslam_ref.conformance.vectors_format import Case, VectorFile
@@ -147,7 +148,7 @@ def ask(asked: Asked, file: VectorFile, case: Case, convention: Convention, prof
     if reply.what == "unsupported":
         return Outcome(file, case, "unsupported", None, "")
     if case.result == "invalid":
-        return _refused(file, case, reply)
+        return _refused(file, case, reply, convention, profile)
     if reply.what != "value":
         return Outcome(file, case, "error", None, f"{reply.what}: {reply.message}")
     try:
@@ -172,7 +173,9 @@ def _named(value: Any, outputs: list[str]) -> dict[str, Any]:
     raise ValueError(f"expected an object with {', '.join(outputs)}")
 
 
-def _refused(file: VectorFile, case: Case, reply: Reply) -> Outcome:
+def _refused(
+    file: VectorFile, case: Case, reply: Reply, convention: Convention, profile: Profile
+) -> Outcome:
     """A case without an answer: an error or ``valid: false`` is right, a number is not."""
     said_no = isinstance(reply.value, dict) and reply.value.get("valid") in (False, 0)
     if reply.what == "error" or said_no:
@@ -180,4 +183,9 @@ def _refused(file: VectorFile, case: Case, reply: Reply) -> Outcome:
     if reply.what != "value":
         return Outcome(file, case, "error", None, f"{reply.what}: {reply.message}")
     wrong = Difference(False, "an answer", reply.value, "a refusal", float("inf"), 0.0)
-    return Outcome(file, case, "failed", wrong, "there is no answer; the program gives one")
+    cause = ""
+    with contextlib.suppress(ValueError, TypeError, IndexError):
+        function = functions()[case.function]
+        got = convention.outputs(function, _named(reply.value, list(function.outputs)), case.inputs)
+        cause = known_mistake(file, case, got, profile)
+    return Outcome(file, case, "failed", wrong, cause or "there is no answer; the program gives one")

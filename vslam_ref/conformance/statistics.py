@@ -84,3 +84,19 @@ def judge(case: Case, got: dict[str, Any]) -> Difference:
         return RIGHT
     told = f"{rule['measure']} of {name} (a right program fails with probability {rule['false_alarm']:g})"
     return Difference(False, told, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
+
+
+def mistaken(case: Case, got: dict[str, Any]) -> str:
+    """Note of the wrong distribution in whose band the measure lies; empty if there is none.
+
+    A case's ``statistic`` may have ``mistakes``: a note's id -> ``low`` and ``high``.
+    """
+    rule = case.statistic or {}
+    if not rule.get("mistakes"):
+        return ""
+    try:
+        value = MEASURES[str(rule["measure"])](numbers(got[str(rule["output"])]))
+    except (KeyError, ValueError, IndexError):
+        return ""
+    bands = rule["mistakes"].items()
+    return next((str(note) for note, band in bands if band["low"] <= value <= band["high"]), "")

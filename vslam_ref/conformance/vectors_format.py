@@ -174,7 +174,7 @@ def lint(file: VectorFile) -> Iterator[str]:
         answers = [case.expected, *case.accept, *case.mistakes.values()]
         if case.result != "invalid" and any(set(a) != set(function.outputs) for a in answers):
             yield f"{case.id}: outputs differ from the catalogue's {sorted(function.outputs)}"
-        for note in case.mistakes:
+        for note in (*case.mistakes, *(case.statistic or {}).get("mistakes", {})):
             if note not in file.notes:
                 yield f"{case.id}: note {note!r} is not explained"
         if not case.tolerance.get("reason"):
