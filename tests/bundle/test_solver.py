@@ -20,6 +20,7 @@ from vslam_ref.estimation.bundle import (
     solver,
 )
 from vslam_ref.estimation.bundle import projection as bundle_projection
+from vslam_ref.estimation.bundle.step import possible
 from vslam_ref.estimation.robust import Huber, Tukey
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.alignment import align
@@ -180,7 +181,7 @@ def test_an_intrinsic_never_leaves_its_domain(rng: np.random.Generator) -> None:
     """A step to a negative omega or focal length is refused."""
     problem, _truth = make(rng, "fov", intrinsics=("f", "omega"), perturb=0.05)
     result = bundle_adjust(hold(problem, [0, 3], problem.scene))
-    assert solver.possible(problem.model, result.problem.scene.intrinsics)
+    assert possible(problem.model, result.problem.scene.intrinsics)
 
 
 EMPTY = np.zeros(0, dtype=int)

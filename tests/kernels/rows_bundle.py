@@ -86,13 +86,13 @@ def for_point_steps(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "bundle:polynomial_residuals": [for_residuals],
     "bundle:polynomial_normal": [for_normal],
-    "bundle:schur_complement": [for_schur, for_schur_shared, for_schur_held, for_schur_shared_held],
-    "bundle:point_steps": [for_point_steps],
+    "bundle_schur:schur_complement": [for_schur, for_schur_shared, for_schur_held, for_schur_shared_held],
+    "bundle_schur:point_steps": [for_point_steps],
 }
 
 
 def meant(twin: str, outputs: list[np.ndarray]) -> list[np.ndarray]:
     """What of the outputs means something: of S the lower triangle."""
-    if twin == "bundle:schur_complement":
+    if twin == "bundle_schur:schur_complement":
         return [np.tril(outputs[0]), *outputs[1:]]
     return outputs

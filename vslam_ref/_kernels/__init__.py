@@ -96,8 +96,8 @@ def _load(twin: str) -> Callable[..., Any]:
     return importlib.import_module(f"{__name__}._signature").compiled(kernel)  # type: ignore[no-any-return]
 
 
-def warm(module: str = "") -> None:
-    """Compile every twin, or those of one module, or read them from the cache on disk, now."""
+def warm(*modules: str) -> None:
+    """Compile every twin, or those of some modules, or read them from the cache on disk, now."""
     for _, twin in REGISTRY.values():
-        if twin.startswith(f"{module}:") or not module:
+        if not modules or twin.partition(":")[0] in modules:
             _load(twin)

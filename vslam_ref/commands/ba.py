@@ -19,7 +19,7 @@ formats (told from the content): BAL text, plain or with .gz or .bz2; libmv .bin
 with COLMAP's cameras.txt, images.txt, points3D.txt
 
 losses: l2 (least squares, the default), huber, cauchy, geman-mcclure, tukey. A robust loss needs the size of
-an honest error: a number of pixels, or 'adaptive', from the median of the errors after every step, as in PTAM.
+an honest error: pixels, or 'adaptive', from the median of the errors after every step, as in PTAM.
 
 Poses and points move; of the intrinsics those that the format says, or those that --free names (f is one
 focal length for both axes, 'none' is none). Nothing is written where there is nothing to adjust.
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"note: {note}")
     with _kernels.use_backend(options.backend) as backend:
         if backend == "numba":
-            _kernels.warm("bundle")  # compiling is no part of the time
+            _kernels.warm("bundle", "bundle_schur")  # compiling is no part of the time
         wall, cpu = time.perf_counter(), time.process_time()
         result = bundle_adjust(problem, robust, settings, _Table())
         seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu

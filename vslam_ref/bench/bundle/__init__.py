@@ -67,7 +67,7 @@ def run(quick: bool = False) -> dict[str, Any]:
         for backend in backends:
             with _kernels.use_backend(backend):
                 if backend == "numba":
-                    _kernels.warm("bundle")
+                    _kernels.warm("bundle", "bundle_schur")
                 bundle_adjust(chain(5), options=Options(max_iterations=2))
         rows += against_scipy(problems, backends, 1 if quick else 7)
         if "pyceres" not in peers.missing():

@@ -13,6 +13,7 @@ module                holds
 ``schur``             points eliminated, and back again
 ``reduced_system``    the system of the views: dense or banded Cholesky
 ``weights``           robust loss, fixed or adaptive scale
+``step``              one damped step, and where it leads
 ``solver``            the loop, and the reasons to end it
 ``result``            what comes back
 ``book``              the same algorithm in plain loops, to be read, and to be compared with

@@ -120,7 +120,7 @@ def reduce(normal: Normal, M: Array, extra: Array, table: Structure) -> Reduced:
     return Reduced(S, rhs)
 
 
-@accelerated("bundle:schur_complement")
+@accelerated("bundle_schur:schur_complement")
 def schur_complement(
     B: Array,
     g_view: Array,
@@ -196,7 +196,7 @@ def _points(offsets: IntArray) -> IntArray:
     return points
 
 
-@accelerated("bundle:point_steps")
+@accelerated("bundle_schur:point_steps")
 def point_steps(
     W: Array, M: Array, g_point: Array, view_steps: Array, view: IntArray, offsets: IntArray
 ) -> Array:

@@ -13,31 +13,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle import normal as normal_equations
 from vslam_ref.estimation.bundle import projection, reduced_system, schur
-from vslam_ref.estimation.bundle.normal import Normal
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, Scene
+from vslam_ref.estimation.bundle.problem import BoolArray, BundleProblem, Scene
 from vslam_ref.estimation.bundle.projection import State
 from vslam_ref.estimation.bundle.result import BundleResult, Iteration, Reason
-from vslam_ref.estimation.bundle.schur import Diagonals
+from vslam_ref.estimation.bundle.step import DAMPED, Point, Step, System, damped_step, moved, system_at
 from vslam_ref.estimation.bundle.structure import Structure, structure
 from vslam_ref.estimation.bundle.weights import Robust, Weighted, weigh
 from vslam_ref.estimation.least_squares.damping import gain_factor
 from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Camera
 
 LEAST_GAIN = 1e-3
 """Share of the promised decrease that a step must bring."""
 
 ROUNDING = 1e-14
 """A promise below this share of the cost cannot be seen in it."""
-
-DAMPED = (1e-6, 1e32)
-"""Bounds of the squared column lengths that the damping multiplies."""
 
 Progress = Callable[[Iteration], None]
 
@@ -76,15 +69,6 @@ class Options:
             raise ValueError(f"max_iterations={self.max_iterations}: must be >= 0")
 
 
-class _Point(NamedTuple):
-    """A state with its residuals (sorted), their validity, and what they cost."""
-
-    state: State
-    r: Array
-    valid: BoolArray
-    weighted: Weighted
-
-
 @dataclass
 class _Run:
     """One adjustment as it goes."""
@@ -104,7 +88,7 @@ class _Run:
         uv = self.table.links.uv
         return len(uv) * (8.0 * schur.EPS * max(1.0, float(np.abs(uv).max(initial=0.0)))) ** 2
 
-    def point(self, state: State, sigma: float | None = None) -> _Point:
+    def point(self, state: State, sigma: float | None = None) -> Point:
         """Evaluate a state, at a given scale or at its own."""
         r, valid = projection.residuals(self.problem.model, state, self.table.links)
         errors = np.einsum("nab,nb->na", self.table.whitener, r) if self.table.has_cov else r
@@ -113,25 +97,7 @@ class _Run:
         costs, weights, used = weigh(self.robust, used, errors, valid)
         inactive = ~self.active
         costs[inactive] = weights[inactive] = 0.0
-        return _Point(state, r, valid, Weighted(costs, weights, used))
-
-
-class _System(NamedTuple):
-    """The normal equations at a point, their diagonal, and their gradient in the reduced columns."""
-
-    normal: Normal
-    diagonal: Diagonals
-    g_view: Array
-    gradient_norm: float
-
-
-class _Step(NamedTuple):
-    """A damped step: of views (V, d), points (N, 3); its length and its promise."""
-
-    view: Array
-    point: Array
-    length: float
-    promised: float
+        return Point(state, r, valid, Weighted(costs, weights, used))
 
 
 def bundle_adjust(
@@ -173,8 +139,7 @@ def bundle_adjust(
     >>> import numpy as np
     >>> from vslam_ref.estimation.bundle import Observations, Scene, freedom
     >>> from vslam_ref.geometry import se3
-    from vslam_ref.geometry.cameras import Camera
-    >>> from vslam_ref.geometry.cameras import Pinhole, projection
+        >>> from vslam_ref.geometry.cameras import Pinhole, projection
     >>> X = np.random.default_rng(0).uniform([-1, -1, 4], [1, 1, 6], (20, 3))
     >>> T = se3.exp([[0.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0.2, 0]])
     >>> K = np.array([[500.0, 500.0, 320.0, 240.0]])
@@ -206,7 +171,7 @@ def bundle_adjust(
 _End = tuple[Reason, str]
 
 
-def _cannot_begin(run: _Run, first: _Point) -> _End | None:
+def _cannot_begin(run: _Run, first: Point) -> _End | None:
     if len(first.r) == 0:
         return "no_observations", "there are no observations"
     if not (first.valid & run.active).any():
@@ -218,7 +183,7 @@ def _cannot_begin(run: _Run, first: _Point) -> _End | None:
     return None
 
 
-def _descend(run: _Run, here: _Point, progress: Progress | None) -> tuple[_Point, _End]:
+def _descend(run: _Run, here: Point, progress: Progress | None) -> tuple[Point, _End]:
     """Try steps until there is a reason to end."""
     options = run.options
     system = None
@@ -227,13 +192,13 @@ def _descend(run: _Run, here: _Point, progress: Progress | None) -> tuple[_Point
             return here, ("all_outliers", f"no error is small against the scale {here.weighted.sigma:.3g}")
         if here.weighted.cost <= run.floor:
             return here, ("cost", f"residuals are zero to rounding, cost {here.weighted.cost:.3g}")
-        system = system or _system(run, here)
+        system = system or system_at(run.problem, run.table, here)
         if system.gradient_norm <= options.gradient:
             return here, ("gradient", f"largest cosine {system.gradient_norm:.3g} <= {options.gradient:g}")
         if len(run.history) >= options.max_iterations:
             return here, ("max_iterations", f"{len(run.history)} steps tried")
-        step = _step(run, system)
-        there = None if step is None else _moved(run, here.state, step)
+        step = damped_step(run.table, system, run.damping, options.method)
+        there = None if step is None else moved(run.problem, here.state, step)
         trial = None if there is None else run.point(there, here.weighted.sigma)
         judged = _judge(run, here, trial, step, system)
         run.history.append(judged)
@@ -259,53 +224,7 @@ def _descend(run: _Run, here: _Point, progress: Progress | None) -> tuple[_Point
                 )
 
 
-def _system(run: _Run, at: _Point) -> _System:
-    table, basis = run.table, run.problem.free.intrinsics
-    normal = normal_equations.normal_equations(run.problem.model, at.state, table, at.weighted.weights, basis)
-    diagonal = schur.diagonals(normal, table)
-    g_view = schur.add_at_columns(table.columns, normal.g_view, table.size)
-    g_point = normal.g_point * table.free_point[:, None]
-    errors = np.einsum("nab,nb->na", table.whitener, at.r) if table.has_cov else at.r
-    length = math.sqrt(float(np.einsum("n,ni,ni->", at.weighted.weights, errors, errors)))
-    norm = 0.0
-    if length > 0.0:
-        pairs = ((g_view, diagonal.view), (g_point, diagonal.point))
-        norm = max(float((np.abs(g) / np.sqrt(np.where(d > 0, d, 1.0))).max(initial=0.0)) for g, d in pairs)
-        norm /= length
-    return _System(normal, diagonal, g_view, norm)
-
-
-def _step(run: _Run, system: _System) -> _Step | None:
-    """Damped step, or None where the reduced system is not positive definite."""
-    table, normal = run.table, system.normal
-    metric = Diagonals(*(np.where(d > 0, np.clip(d, *DAMPED), 1.0) for d in system.diagonal))
-    M = schur.point_factor(normal.C, run.damping * metric.point, table.free_point)
-    S, rhs = schur.reduce(normal, M, run.damping * metric.view, table)
-    method = run.options.method or reduced_system.choose(table.size, table.border, table.bandwidth)
-    factor = reduced_system.factor(S, table.border, table.bandwidth, method)
-    if factor is None:
-        return None
-    reduced = factor.solve(rhs)
-    view_step = np.append(reduced, 0.0)[table.columns]
-    point_step = schur.point_steps(normal.W, M, normal.g_point, view_step, table.links.view, table.offsets)
-    square = float(metric.view @ reduced**2 + np.sum(metric.point * point_step**2))
-    slope = float(system.g_view @ reduced + np.sum(normal.g_point * point_step))
-    return _Step(view_step, point_step, math.sqrt(square), 0.5 * (run.damping * square - slope))
-
-
-def _moved(run: _Run, state: State, step: _Step) -> State | None:
-    """State after a step: Exp(xi) T, and sums; None where its intrinsics make no camera."""
-    T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
-    intrinsics = state.intrinsics.copy()
-    # views that share a lens have equal steps of it: any of them tells
-    intrinsics[run.problem.lens_of_view] += step.view[:, 6:] @ run.problem.free.intrinsics.T
-    if step.view.shape[1] > 6 and not possible(run.problem.model, intrinsics):
-        return None
-    R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
-    return State(R, t, state.X_world + step.point, intrinsics)
-
-
-def _judge(run: _Run, here: _Point, trial: _Point | None, step: _Step | None, system: _System) -> Iteration:
+def _judge(run: _Run, here: Point, trial: Point | None, step: Step | None, system: System) -> Iteration:
     """Compare what a step brought with what it promised; a step that leads nowhere is refused."""
     cost, sigma = here.weighted.cost, here.weighted.sigma
     if step is None or trial is None:
@@ -319,24 +238,7 @@ def _judge(run: _Run, here: _Point, trial: _Point | None, step: _Step | None, sy
     return Iteration(after, decrease, system.gradient_norm, step.length, run.damping, gain, accepted, sigma)
 
 
-def possible(model: type[Camera], intrinsics: Array) -> bool:
-    """Tell whether every set of intrinsics (L, p) makes a camera: focal lengths above 0, and so on.
-
-    Examples
-    --------
-    >>> from vslam_ref.geometry.cameras import Pinhole
-    >>> possible(Pinhole, np.array([[500.0, 500, 320, 240], [500.0, -500, 320, 240]]))
-    False
-    """
-    try:
-        for values in intrinsics:
-            model.from_params(values)
-    except ValueError:
-        return False
-    return True
-
-
-def _result(run: _Run, first: _Point, last: _Point, ended: _End) -> BundleResult:
+def _result(run: _Run, first: Point, last: Point, ended: _End) -> BundleResult:
     """Put everything back into the problem's order."""
     table, problem = run.table, run.problem
     back, point_back = np.argsort(table.order), np.argsort(table.point_order)
