@@ -379,7 +379,7 @@ def test_the_map_grows_beyond_its_borders_and_nothing_moves(backend: str) -> Non
     """The same scans, with the map grown beforehand or on the way, to all four sides."""
     grown, ready = StaticDynamicMap(), StaticDynamicMap()
     far = [(0, 0), (9, 1), (-13, 2), (1, 17), (2, -11)]
-    ready._grow(np.array([[-40.0, -40.0], [40.0, 40.0]]))
+    ready.reserve(np.array([[-40.0, -40.0], [40.0, 40.0]]))
     for k, (x, y) in enumerate(far):
         for grid in (grown, ready):
             grid.update([x, y, 0.4 * k], Scan(np.linspace(-3, 3, 50), np.full(50, 4.0), 50.0, float(k)))

@@ -12,7 +12,11 @@ from vslam_ref.commands.options import add_json, json_target, write_json
 HELP = "time the library on this machine, against the peers that are installed"
 EPILOG = "example: vslam-ref bench filters --quick --json bench.json"
 
-SUITES = {"filters": "vslam_ref.bench.filters", "bundle": "vslam_ref.bench.bundle"}
+SUITES = {
+    "filters": "vslam_ref.bench.filters",
+    "bundle": "vslam_ref.bench.bundle",
+    "grids": "vslam_ref.bench.grids",
+}
 """Name -> module with ``run(quick) -> dict``; its ``rows``, a list of flat dicts, is printed as a table."""
 
 

@@ -11,9 +11,8 @@ One message a line, its name first; ``#`` begins a comment.  Read are the scans 
 What the format leaves open, and what is taken here:
 
 * *Where the beams look.*  The lasers of these logs have steps of a whole or a half degree and begin at -90
-  degrees: 181 and 361 beams span the half circle with both ends, 180 and 360 lack one.  Hence the step
-  is 180 degrees over n for even n, over n - 1 for odd n.  (On intel, aces and fhw every other choice blurs the
-  map.)
+  degrees: 181 and 361 beams span the half circle with both ends, 180 and 360 lack one.  Hence the step is 180
+  degrees over n for even n, over n - 1 for odd n.  (On intel, aces and fhw every other choice blurs the map.)
 * *When nothing came back.*  The scanners send 81.91, 81.83, 51.15 or 50 m then, by make and driver.  Readings
   of 50 m (:data:`MAX_RANGE`) and more count as "no return"; no wall of a building is seen from there.
 * *Time.*  ``ipc_time``, as it is.  Stamps that run backwards or stand still are counted, and never refused.

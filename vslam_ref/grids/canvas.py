@@ -63,7 +63,7 @@ class Canvas:
         beams = sort_beams(scan, self._usable_range, self._no_return_is_free)
         directions = at[2] + beams.angles
         ends_world = at[:2] + beams.lengths[:, None] * np.stack([np.cos(directions), np.sin(directions)], 1)
-        self._grow(np.vstack([ends_world, at[:2]]))
+        self.reserve(np.vstack([ends_world, at[:2]]))
         backward = scan.time <= self.time
         self.time = math.nextafter(self.time, math.inf) if backward else float(scan.time)
         self.scans += 1
@@ -81,8 +81,14 @@ class Canvas:
         """Change the layers by beams given in cells from the lattice's corner."""
         raise NotImplementedError
 
-    def _grow(self, points: Array) -> None:
-        """Grow until points (N, 2) lie inside, with a cell to spare for rounding."""
+    def reserve(self, points: Array) -> None:
+        """Grow until world points (N, 2) lie inside, with a cell to spare for rounding.
+
+        Raises
+        ------
+        ValueError
+            If the map would exceed its limit of cells.  It is then as it was.
+        """
         margin = self.lattice.resolution
         larger = self.lattice.grown(points.min(axis=0) - margin, points.max(axis=0) + margin)
         if larger is not self.lattice:

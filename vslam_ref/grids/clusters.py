@@ -29,13 +29,15 @@ class TrackConfig:
     """How clusters are made and followed; every field says why it has its value."""
 
     join: float = field(default=0.3, metadata={"reason": "the legs of a person", "unit": "m"})
-    least_cells: int = field(default=2, metadata={"reason": "one cell alone is mostly noise"})
-    gate: float = field(default=0.6, metadata={"reason": "2 m/s over a quarter of a second", "unit": "m"})
+    least_cells: int = field(
+        default=3, metadata={"reason": "one or two cells are mostly noise or a table's leg"}
+    )
+    gate: float = field(default=0.5, metadata={"reason": "2 m/s over a quarter of a second", "unit": "m"})
     lost_seconds: float = field(default=1.0, metadata={"reason": "a person behind a pillar", "unit": "s"})
     velocity_seconds: float = field(default=1.0, metadata={"reason": "a step or two", "unit": "s"})
-    confirm: int = field(default=4, metadata={"reason": "scans; fewer give no velocity worth the name"})
+    confirm: int = field(default=5, metadata={"reason": "scans; fewer give no velocity worth the name"})
     least_move: float = field(default=1.0, metadata={"reason": "more than the size of a table", "unit": "m"})
-    wander: float = field(default=2.0, metadata={"reason": "noise of a centre lengthens the way of a walker"})
+    wander: float = field(default=1.6, metadata={"reason": "noise of a centre lengthens the way of a walker"})
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -21,9 +21,9 @@ And the first term can be read in two ways:
 * ``evidence``: e alone, as if S_{t-1} were 0.5.
 
 What is right when the cell does not change is known: L(S_{t-1}) + e.  Three of the six combinations give it:
-``conditioned`` with either of the readings that say one thing (the table alone, nothing multiplied to it), and
-``printed`` with ``evidence``: the formula as it is, its table read as a likelihood ratio.  The maps of this room do
-the last.
+``conditioned`` with either of the readings that say one thing (the table alone, nothing multiplied to it),
+and ``printed`` with ``evidence``: the formula as it is, its table read as a likelihood ratio.  The maps of
+this room do the last.
 """
 
 from __future__ import annotations

@@ -1,0 +1,112 @@
+"""``vslam-ref grid``: static and dynamic maps of a laser log."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vslam_ref.commands.options import add_json, json_target, write_json
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from vslam_ref.datasets.carmen import CarmenLog
+    from vslam_ref.experiments.grid_log.mapping import GridConfig, Mapped
+
+HELP = "draw the static and the dynamic map of a laser log with known poses"
+EPILOG = """\
+LOG is a log in CARMEN's text format, plain or '.gz', whose FLASER poses are known (a corrected log), or
+the name of one of the set carmen_2d, found through VSLAM_REF_DATA: intel, csail, aces, freiburg-079,
+edmonton, fhw.
+
+numbers (also in --json): scans, stamps that do not move forward, beams by kind, cells looked at, mean entropy
+of the static map in bit per cell, cells that were ever dynamic, things that moved at least a metre,
+and the time that the two maps took.
+
+'--set map.settle_seconds=none' and '--set map.explained_by=0' give the table of the book as it is printed.
+
+examples:
+  vslam-ref grid intel --out out/intel
+  vslam-ref grid freiburg-079-corrected.log.gz --out out/fr079 --resolution 0.05 --json fr079.json"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this command."""
+    parser.add_argument("log", metavar="LOG", help="laser log; see below")
+    parser.add_argument("--out", metavar="DIR", required=True, help="write maps, film and page there")
+    parser.add_argument(
+        "--resolution", type=float, metavar="M", help="side of a cell in metres (default: 0.1)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting; may be repeated"
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read the log, draw the maps, print and write the numbers."""
+    target = json_target(options)
+
+    from vslam_ref.commands.tables import table
+    from vslam_ref.datasets import carmen
+    from vslam_ref.experiments.framework import files
+    from vslam_ref.experiments.framework.config import apply_overrides, config_to_dict
+    from vslam_ref.experiments.framework.provenance import versions
+    from vslam_ref.experiments.grid_log import report
+    from vslam_ref.experiments.grid_log.mapping import GridConfig
+    from vslam_ref.experiments.slam_log.report import check_out
+
+    out = check_out(options.out)
+    given = [] if options.resolution is None else [f"map.resolution={options.resolution!r}"]
+    config = apply_overrides(GridConfig(), [*given, *options.set])
+    log = carmen.read(find_log(options.log))
+    with files.new_folder(out) as folder:
+        mapped = draw(log, config, folder)
+        content: dict[str, Any] = mapped.numbers()
+        content |= {"config": config_to_dict(config), "versions": versions()}
+        report.write_report(folder, mapped, content)
+    print(table(["what", "value", "unit"], report.number_rows(content)))
+    print(f"page: {out / 'report.html'}")
+    write_json(target, content)
+    return 0
+
+
+def find_log(name: str) -> Path:
+    """Return the file of that name, or the log of the known set that is called so."""
+    from vslam_ref.datasets import catalogue
+    from vslam_ref.datasets.text import FormatError
+
+    path = Path(name)
+    if path.is_file():
+        return path
+    folder = catalogue.find("carmen_2d")
+    known = {p.name.split("-corrected")[0]: p for p in sorted(folder.glob("*.log.gz"))} if folder else {}
+    if name in known:
+        return known[name]
+    others = f", or one of {', '.join(known)}" if known else ""
+    raise FormatError(path, None, f"no such file; expected a CARMEN log{others}")
+
+
+def draw(log: CarmenLog, config: GridConfig, folder: Path) -> Mapped:
+    """Run over the log with a film and a progress bar."""
+    from vslam_ref.datasets import video
+    from vslam_ref.experiments.grid_log.frames import Director
+    from vslam_ref.experiments.grid_log.mapping import map_log
+
+    with progress_bar(len(log.times)) as progress:
+        if not config.video_frames:
+            return map_log(log, config, None, progress)
+        with video.mp4(folder / "animation.mp4") as film:
+            return map_log(log, config, Director(film, len(log.times), config.video_frames), progress)
+
+
+@contextmanager
+def progress_bar(total: int) -> Iterator[Callable[[int], None]]:
+    """Show progress on a terminal; be silent elsewhere."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, unit="scan", disable=None, leave=False) as bar:
+        yield lambda done: bar.update(done - bar.n)

@@ -1,0 +1,157 @@
+"""What ``vslam-ref grid`` leaves.
+
+::
+
+    OUT/result.json               the numbers that were printed
+    OUT/static.png, .yaml         S as a map of ROS' map_server
+    OUT/dynamic.png, .yaml        D at the end of the log
+    OUT/plain.png, .yaml          the plain grid
+    OUT/maps.npz                  log_odds_s, log_odds_d, log_odds_plain, dynamic_scans, origin_xy,
+                                  resolution, times
+    OUT/tracks.csv                what moved: id, time, x, y
+    OUT/maps.png, .svg            the maps, and where and when something moved
+    OUT/animation.mp4             S with D, and the plain grid, over time
+    OUT/report.html               the page: numbers and pictures inside it, the film beside it
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vslam_ref.datasets import grid_files
+from vslam_ref.experiments.framework.results import to_json
+from vslam_ref.experiments.grid_log.mapping import Mapped
+from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.plot.grids import log_figure
+from vslam_ref.plot.saving import figure_bytes
+
+ROWS = (
+    ("scans", "scans", ""),
+    ("backward_stamps", "stamps that do not move forward", ""),
+    ("beams", "beams", ""),
+    ("beams_hit", "beams that hit something", ""),
+    ("beams_no_return", "beams from which nothing came back", ""),
+    ("beams_not_a_number", "beams that are no number", ""),
+    ("beams_not_positive", "beams of zero or negative range", ""),
+    ("cells", "cells looked at", ""),
+    ("static_cells", "cells decided static, S", ""),
+    ("plain_cells", "cells decided occupied, plain grid", ""),
+    ("dynamic_cells", "cells that were ever decided dynamic, D", ""),
+    ("dynamic_objects", "things that moved", ""),
+    ("entropy", "mean entropy of S", "bit"),
+    ("entropy_plain", "mean entropy of the plain grid", "bit"),
+    ("seconds", "time for S and D", "s"),
+    ("scans_per_s", "scans per second", "1/s"),
+)
+"""Key in the JSON, words and unit in the table."""
+
+
+def number_rows(numbers: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of the table of numbers."""
+    return [[words, _show(numbers[key]), unit] for key, words, unit in ROWS]
+
+
+def _show(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def crop(mapped: Mapped) -> tuple[slice, slice]:
+    """Rows and columns that hold all cells that were looked at, and one cell around."""
+    rows, columns = (np.flatnonzero(mapped.map.observed().any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return slice(0, 1), slice(0, 1)
+    return tuple(slice(max(int(v[0]) - 1, 0), int(v[-1]) + 2) for v in (rows, columns))  # type: ignore[return-value]
+
+
+def write_report(folder: Path, mapped: Mapped, content: Mapping[str, Any]) -> None:
+    """Write all but the film into ``folder``."""
+    window = crop(mapped)
+    maps = {
+        "static": mapped.map.static().part(*window),
+        "dynamic": mapped.map.dynamic().part(*window),
+        "plain": mapped.plain.occupied().part(*window),
+    }
+    for name, grid in maps.items():
+        grid_files.write_ros_map(folder, name, grid)
+    np.savez_compressed(
+        folder / "maps.npz",
+        log_odds_s=maps["static"].log_odds,
+        log_odds_d=maps["dynamic"].log_odds,
+        log_odds_plain=maps["plain"].log_odds,
+        dynamic_scans=mapped.dynamic_scans[window],
+        origin_xy=np.array(maps["static"].origin_xy),
+        resolution=np.array(maps["static"].resolution),
+        times=mapped.log.times,
+    )
+    _write_tracks(folder / "tracks.csv", mapped)
+    figure = _figure(mapped, maps, window)
+    for suffix in ("png", "svg"):
+        (folder / f"maps.{suffix}").write_bytes(figure_bytes(figure, suffix, mapped.log.path.name))
+    (folder / "result.json").write_text(to_json(content), encoding="utf-8", newline="\n")
+    page = _page(mapped.log.path.name, content, (folder / "maps.png").read_bytes(), folder)
+    (folder / "report.html").write_text(page, encoding="utf-8", newline="\n")
+
+
+def _write_tracks(path: Path, mapped: Mapped) -> None:
+    lines = ["id,time_s,x_m,y_m"]
+    for number, track in sorted(mapped.tracker.moved.items()):
+        for time, place in zip(track.times, track.places, strict=True):
+            lines.append(f"{number},{time:.6f},{place[0]:.4f},{place[1]:.4f}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _figure(mapped: Mapped, maps: Mapping[str, LogOddsGrid], window: tuple[slice, slice]) -> Any:
+    cells = np.argwhere(mapped.dynamic_scans[window] > 0)
+    static = maps["static"]
+    minutes = (mapped.last_dynamic[window][tuple(cells.T)] - mapped.log.times[0]) / 60.0
+    return log_figure(
+        static.probability,
+        maps["plain"].probability,
+        static.lattice.extent,
+        static.lattice.world_from_cells(cells),
+        minutes,
+        mapped.log.poses[:, :2],
+        [np.array(track.places) for track in mapped.tracker.moved.values()],
+        mapped.log.path.name,
+    )
+
+
+_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
+  color: #1b1b1b; background: #fff; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { border: 1px solid #c8c8c8; padding: .3rem .6rem; text-align: right; }
+th:first-child { text-align: left; } img, video { max-width: 100%; height: auto; }"""
+
+
+def _page(title: str, content: Mapping[str, Any], png: bytes, folder: Path) -> str:
+    """``report.html``: no script, no font, no request but for the film beside it."""
+    body = "\n".join(
+        f'<tr><th scope="row">{escape(words)}</th><td>{escape(value)}</td><td>{escape(unit)}</td></tr>'
+        for words, value, unit in number_rows(content)
+    )
+    film = ""
+    if (folder / "animation.mp4").exists():
+        film = (
+            '<p><a href="animation.mp4">animation.mp4</a>: S with D in red-orange and the ways of what '
+            "moved in light blue, the plain grid beside it, the robot in blue.</p>\n"
+        )
+    data = base64.b64encode(png).decode("ascii")
+    links = " ".join(
+        f'<a href="{name}">{name}</a>'
+        for name in ("static.yaml", "dynamic.yaml", "plain.yaml", "maps.npz", "tracks.csv", "result.json")
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<link rel="icon" href="data:,">\n'
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{escape(title)}</h1>\n<table>\n<tbody>\n{body}\n</tbody>\n</table>\n"
+        f'<p><img src="data:image/png;base64,{data}" alt="Static map, plain grid, what moved"></p>\n'
+        f"{film}<p>{links}</p>\n</main>\n</body>\n</html>\n"
+    )
