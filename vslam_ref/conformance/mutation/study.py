@@ -1,0 +1,123 @@
+"""A seeded sample of mutants under the vectors.
+
+The parent of all mutants must not have imported what they change, so everything here imports late.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+from vslam_ref.conformance.mutation.child import ROOT, Verdict, executed, run_mutant, source_of
+from vslam_ref.conformance.mutation.sites import Mutant, mutants
+
+ROOMS = ("geometry", "estimation", "filters", "grids")
+GOAL = 0.95
+"""Share of mutants that the vectors should notice."""
+
+LONGEST = 40.0
+"""Seconds after which a mutant does not end."""
+
+
+class Study(NamedTuple):
+    """Mutants and what became of them.
+
+    Attributes
+    ----------
+    functions : list of str
+        Equation-bearing functions that the vectors run, ``module.function``.
+    unseen : list of str
+        Equation-bearing functions of the rooms that no vector runs.
+    possible : int
+        Number of mutants of the first.
+    sample : list of (Mutant, Verdict)
+    seconds : float
+    """
+
+    functions: list[str]
+    unseen: list[str]
+    possible: int
+    sample: list[tuple[Mutant, Verdict]]
+    seconds: float
+
+    @property
+    def killed(self) -> int:
+        """Number of mutants that the vectors noticed."""
+        return sum(verdict.killed for _, verdict in self.sample)
+
+    def numbers(self) -> dict[str, Any]:
+        """Content of ``--json``."""
+        survivors = [m._asdict() for m, v in self.sample if not v.killed]
+        return {
+            "functions": self.functions,
+            "unseen": self.unseen,
+            "possible": self.possible,
+            "sample": len(self.sample),
+            "killed": self.killed,
+            "share": self.killed / max(1, len(self.sample)),
+            "survivors": survivors,
+            "seconds": self.seconds,
+        }
+
+
+def modules() -> list[str]:
+    """Modules of the rooms, without importing any."""
+    files = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
+    names = [".".join(("vslam_ref", *path.relative_to(ROOT).with_suffix("").parts)) for path in files]
+    return [name.removesuffix(".__init__") for name in names]
+
+
+def study(
+    sample: int, seed: int, jobs: int, told: Callable[[Mutant, Verdict], None] = lambda m, v: None
+) -> Study:
+    """Run a sample of mutants.
+
+    Parameters
+    ----------
+    sample : int
+        How many; all if there are fewer.
+    seed : int
+    jobs : int
+        Mutants side by side.
+    told : callable
+        Called with each verdict.
+    """
+    import random
+
+    began = time.monotonic()
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    import numpy  # noqa: F401 - imported once, before the forks
+
+    names = _names()
+    everything = [m for module in modules() for m in mutants(module, source_of(module)[0])]
+    run = set(executed(names))
+    bearing = {(m.module, m.function) for m in everything}
+    seen = {pair for pair in bearing if pair in run}
+    usable = [m for m in everything if (m.module, m.function) in seen]
+    chosen = random.Random(seed).sample(usable, min(sample, len(usable)))
+
+    def judge(mutant: Mutant) -> tuple[Mutant, Verdict]:
+        verdict = run_mutant(mutant, names, LONGEST)
+        told(mutant, verdict)
+        return mutant, verdict
+
+    with ThreadPoolExecutor(jobs) as pool:
+        results = list(pool.map(judge, chosen))
+    return Study(
+        functions=sorted(f"{m}.{f}" for m, f in seen),
+        unseen=sorted(f"{m}.{f}" for m, f in bearing - seen),
+        possible=len(usable),
+        sample=results,
+        seconds=time.monotonic() - began,
+    )
+
+
+def _names() -> list[str]:
+    """Names of the vectors' files; importing their module brings no numeric room along."""
+    from vslam_ref.conformance.vectors_format import names
+
+    return names()
