@@ -3,13 +3,14 @@ r"""The seven coordinates that no image shows: where the world's frame is, how i
 Move, turn and scale the world and all cameras with it: every image stays the same.  A reconstruction is
 therefore a whole family, and its normal matrix has rank seven too few.  Three ways to live with it:
 
-* *free*: leave it to the damping.  Steps along the family are zero to rounding, since the gradient has no
-  part there; the answer lies near the start.
+* *free*: leave it to the damping.  In its metric, steps have no part along the family, since the gradient has
+  none; the answer lies near the start.
 * *fixed*: :func:`fix_gauge` holds six coordinates of one view and one of another.
 * *tied*: fixed points or views, as in local adjustment.
 
-The minimum, the images and every angle and ratio of lengths are the same in all of them; the covariances of
-single coordinates are not (:mod:`.covariance`).
+The minimum, the images and every angle and ratio of lengths are the same with a free and with a fixed gauge;
+the covariances of single coordinates are not (:mod:`.covariance`).  What is tied at more than seven
+coordinates is bent to fit them: its minimum is higher.
 """
 
 from __future__ import annotations
