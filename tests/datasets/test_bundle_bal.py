@@ -244,6 +244,23 @@ def test_a_wrong_file_is_told_in_one_line(
     assert "\n" not in message
 
 
+def test_an_error_at_the_end_of_a_large_file_is_found_as_fast_as_the_file_is_read(tmp_path: Path) -> None:
+    """Lines are counted once, not for every word: 3 MB and 300,000 words would take minutes."""
+    rows = "".join(f"0 {k} 1.5 2.5\n" for k in range(150_000))
+    text = f"1 150000 150000\n{rows}" + "0 0 0 0 0 0 500 0 0\n" + "0 0 1\n" * 149_999
+    path = written(tmp_path, text + "0 0 x\n")
+    begin = time.process_time()
+    with pytest.raises(FormatError, match=r":300002: 'x' is no number"):
+        read_bal(path)
+    path.write_text(text + "0 0\n")
+    with pytest.raises(FormatError, match=r":300001: the file ends after|:300002: the file ends after"):
+        read_bal(path)
+    path.write_text((text + "0 0 1\n").replace("\n0 149999 ", "\n0 149998 "))
+    with pytest.raises(FormatError, match=r":150001: camera 0 sees point 149998 again; line 150000"):
+        read_bal(path)
+    assert time.process_time() - begin < 10.0  # measured: 1 s
+
+
 def test_lonely_points_and_idle_cameras_are_no_errors_of_the_reader(tmp_path: Path) -> None:
     lines = [line for line in LINES if not line.startswith(("0 4 ", "1 "))]
     lines[0] = f"3 5 {len(samples.PAIRS) - 4}"

@@ -6,6 +6,7 @@ to doubles piece by piece; the line of a number is looked for only when somethin
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -145,19 +146,21 @@ def _pieces(data: bytes) -> Iterator[tuple[int, int]]:
 
 def _wrong_word(path: Path, data: bytes, start: int, stop: int) -> FormatError:
     """The error at the first word of a piece that is no finite number."""
+    at, what = start, "not a text of numbers; expected digits, blanks and line ends"
     for match in re.finditer(rb"\S+", data[start:stop]):
-        word = match[0]
-        line = data.count(b"\n", 0, start + match.start()) + 1
-        if len(word) > LONGEST_WORD:
-            told = f"a word of {len(word)} characters; expected a number of at most {LONGEST_WORD}"
-            return FormatError(path, line, told)
-        if not word.translate(None, ALLOWED):
-            try:
-                if np.isfinite(float(word)):
-                    continue
-            except ValueError:
-                pass
-        shown = word[:40].decode("ascii", "backslashreplace")
-        return FormatError(path, line, f"{shown!r} is no number; expected a finite number")
-    line = data.count(b"\n", 0, start) + 1
-    return FormatError(path, line, "not a text of numbers; expected digits, blanks and line ends")
+        if not _is_number(match[0]):
+            at, word = start + match.start(), match[0]
+            what = f"{word[:40].decode('ascii', 'backslashreplace')!r} is no number; expected a finite number"
+            if len(word) > LONGEST_WORD:
+                what = f"a word of {len(word)} characters; expected a number of at most {LONGEST_WORD}"
+            break
+    return FormatError(path, data.count(b"\n", 0, at) + 1, what)
+
+
+def _is_number(word: bytes) -> bool:
+    if len(word) > LONGEST_WORD or word.translate(None, ALLOWED):
+        return False
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
