@@ -33,8 +33,8 @@ def test_peer_and_library_see_the_same_room() -> None:
     rays.mark_beams(window, start, ends, hit)
     free = theirs.T == 0.0  # theirs has x first
     ours = window == rays.MISS
-    # theirs moves ends by half a cell and leaves the line by half a cell: every cell of theirs is a neighbour of
-    # ours, and ours, which has every cell that is cut, has more
+    # theirs moves ends by half a cell and leaves the line by half a cell: every cell of theirs is a neighbour
+    # of ours, and ours, which has every cell that is cut, has more
     near = binary_dilation(window != rays.UNSEEN, np.ones((3, 3)))
     assert not (free & ~near).any()
     assert 1.0 < ours.sum() / free.sum() < 1.6

@@ -70,7 +70,7 @@ class Slow:
         m = self.cells.setdefault(cell, fresh)
         state = before.get(cell, UNKNOWN)
         if what == "hit":
-            if now - m["last_hit"] > c.hit_gap:
+            if m["last_hit"] == -math.inf:
                 m["since"] = now
             m["last_hit"] = now
             r = c.explained_by
@@ -84,6 +84,8 @@ class Slow:
             high = FREE if c.d_high_where == "free" else UNKNOWN
             p_d = s.d_high if state == high else s.d_low
         else:
+            if now - m["last_hit"] > c.hit_gap:
+                m["last_hit"] = -math.inf
             p_s, p_d = s.s_miss, s.d_miss
         if c.d_memory == "text" or now - m["seen"] > c.d_lifetime:
             m["d"] = 0.0
@@ -202,18 +204,25 @@ def test_a_chair_put_down_on_free_floor_is_dynamic_for_ever_unless_it_settles(
         assert dynamic < 0.1
 
 
-def test_settling_needs_the_whole_time_and_no_gap(backend: str) -> None:
-    c = MapConfig(settle_seconds=3.0, hit_gap=0.5)
-    for gap, settles in ((0.4, True), (0.6, False)):
-        grid = StaticDynamicMap(c)
-        for k in range(10):
-            look(grid, 0.1 * k, 4.05)
-        times = [1.0 + 0.2 * k for k in range(12)]
-        times += [times[-1] + gap + 0.2 * k for k in range(4)]
-        for t in times:
-            look(grid, t, 2.05)
-        assert times[-1] - times[0] > 3.0
-        assert (grid.static().at([[2.05, 0.05]])[0] > -2.0) == settles
+@pytest.mark.parametrize(
+    ("gap", "looked_at", "settles"), [(0.4, True, True), (0.8, True, False), (0.8, False, True)]
+)
+def test_settling_needs_the_whole_time_and_no_long_miss(
+    gap: float, looked_at: bool, settles: bool, backend: str
+) -> None:
+    """Not to be looked at is no miss: the robot may turn away."""
+    grid = StaticDynamicMap(MapConfig(settle_seconds=3.0, hit_gap=0.5))
+    for k in range(10):
+        look(grid, 0.1 * k, 4.05)
+    for k in range(12):
+        look(grid, 1.0 + 0.2 * k, 2.05)
+    end = 1.0 + 0.2 * 11
+    for k in range(1, int(gap / 0.1)):
+        look(grid, end + 0.1 * k, 4.05 if looked_at else np.nan)
+    for k in range(5):
+        look(grid, end + gap + 0.2 * k, 2.05)
+    assert end + gap + 0.8 - 1.0 > 3.0
+    assert (grid.static().at([[2.05, 0.05]])[0] > -2.0) == settles
 
 
 def test_a_hit_beside_a_wall_is_the_walls(backend: str) -> None:

@@ -152,8 +152,10 @@ def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, 
             state = _state(old)
             is_hit = 1 if look >= HIT else 0
             if is_hit:
-                since[at] = now if now - last_hit[at] > gap else since[at]
+                since[at] = now if last_hit[at] == -np.inf else since[at]
                 last_hit[at] = now
+            elif now - last_hit[at] > gap:
+                last_hit[at] = -np.inf
             if is_hit and state == FREE and now - since[at] >= settle:
                 old, state = 0.0, UNKNOWN
             prior = 0.0 if now - seen[at] > lifetime else d[at]

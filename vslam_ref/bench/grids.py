@@ -128,7 +128,8 @@ def one_scan(backend: str, quick: bool) -> list[dict[str, Any]]:
     def s_and_d() -> None:
         clock[0] += 0.1
         static_dynamic.apply_scan(
-            s, d, seen, last_hit, since, CELLS, start, ends, hit, steps.static, steps.dynamic, limits, clock[0]
+            s, d, seen, last_hit, since, CELLS, start, ends, hit,
+            steps.static, steps.dynamic, limits, clock[0],
         )  # fmt: skip
 
     things: dict[str, Callable[[], object]] = {

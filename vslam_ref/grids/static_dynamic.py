@@ -14,9 +14,10 @@ Three rules are added, each with a switch:
 * *explained hits*: a hit within ``explained_by`` cells of a decided static cell is taken for that cell's, in
   both tables: noise of the range and of the pose makes walls no movers, and a wall that lost a cell gets
   it back.  0 is the table as it stands: a cell of a wall that was free once is lost for ever.
-* *settling* (the ageing variant): what was hit again and again for ``settle_seconds`` on free floor, never
-  ``hit_gap`` seconds apart, has come to stay.  S forgets there that the floor was free, and takes it in.
-  ``None`` is the table as it stands: a chair put down on once-free floor is dynamic for ever.
+* *settling* (the ageing variant): what was hit on free floor again and again for ``settle_seconds``, and
+  never missed later than ``hit_gap`` seconds after a hit, has come to stay.  S forgets there that the floor was
+  free, and takes it in.  ``None`` is the table as it stands: a chair put down on once-free floor is dynamic
+  for ever.
 
 :data:`AS_PRINTED` has none of the last two.
 """
@@ -72,7 +73,7 @@ class MapConfig:
     )
     hit_gap: float = field(
         default=1.0,
-        metadata={"reason": "hits further apart are two visits; beams miss thin things", "unit": "s"},
+        metadata={"reason": "beams miss thin things; a miss later than that ends a visit", "unit": "s"},
     )
     s_most: float = field(default=0.999, metadata={"reason": "S changes its mind after six misses"})
     d_most: float = field(default=0.96, metadata={"reason": "D lets go at the first miss"})
@@ -211,7 +212,7 @@ def apply_scan(
     s, d : ndarray, shape (rows * columns,)
         Log-odds, row by row.
     seen, last_hit, since : ndarray, shape (rows * columns,)
-        Times: of the last look, of the last hit, and of the first hit of the run that it belongs to.
+        Times: of the last look, of the last hit of the present visit (-inf: none), and of its first hit.
     columns : int
         Cells in a row.
     start : ndarray, shape (2,)
@@ -236,7 +237,7 @@ def apply_scan(
 
     # S_{t-1} in the cells that were hit
     s_hit = s[hits]
-    began = np.where(now - last_hit[hits] > gap, now, since[hits])
+    began = np.where(last_hit[hits] == -np.inf, now, since[hits])
     settled = (states(s_hit) == FREE) & (now - began >= settle)
     s_hit[settled] = 0.0
     state = np.where(explained, OCCUPIED, states(s_hit))
@@ -251,6 +252,7 @@ def apply_scan(
     np.clip(s, -s_bound, s_bound, out=s)
     np.clip(d, -d_bound, d_bound, out=d)
     seen[window != rays.UNSEEN] = now
+    last_hit[missed & (now - last_hit > gap)] = -np.inf  # the visit is over
     since[hits], last_hit[hits] = began, now
 
 

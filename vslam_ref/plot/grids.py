@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -74,31 +74,57 @@ def log_figure(
     return figure
 
 
-def variants_figure(maps: Mapping[str, tuple[Array, Array]], extent: Extent, truth: Array) -> Figure:
-    """Draw S with D for each of some variants, in one row, the truth of what moves outlined.
+def readings_figure(names: Sequence[str], precision_recall: Array) -> Figure:
+    """Draw precision and recall of D, one mark a run.
 
     Parameters
     ----------
-    maps : mapping of str to (ndarray, ndarray), shape (rows, columns)
-        Title -> probabilities of S and of D.
-    extent : tuple
-        (left, right, bottom, top), metres.
-    truth : ndarray of bool, shape (rows, columns)
-        Cells of what moves.
+    names : sequence of str
+        Of the readings.
+    precision_recall : ndarray, shape (runs, readings, 2)
+    """
+    colours = (style.BLUE, style.SKY, style.VERMILION, style.ORANGE)
+    marks = ("o", "s", "^", "v")
+    with style.house_style():
+        figure, (axes,) = style.new_figure(4.6)
+        for i, name in enumerate(names):
+            axes.plot(
+                precision_recall[:, i, 1], precision_recall[:, i, 0], ls="none", marker=marks[i], ms=8,
+                color=colours[i], mec="white", mew=0.7, label=name,
+            )  # fmt: skip
+        axes.set(
+            xlabel="recall: share of what moves that D holds", ylabel="precision: share of D that moves",
+            xlim=(-0.03, 1.03), ylim=(-0.03, 1.03),
+        )  # fmt: skip
+        axes.legend(loc="center right", frameon=True)
+    return figure
+
+
+def chair_figure(
+    since: Array, static: Array, dynamic: Array, variants: Sequence[str], settle: float
+) -> Figure:
+    """Draw the share of a chair's cells in S and in D over time, one panel a variant.
+
+    Parameters
+    ----------
+    since : ndarray, shape (n,)
+        Seconds since it was put down.
+    static, dynamic : ndarray, shape (variants, n)
+        Shares, NaN where it is not seen.
+    variants : sequence of str
+    settle : float
+        Seconds after which the ageing variant takes it in.
     """
     with style.house_style():
-        figure, panels = style.new_figure(3.4, len(maps))
-        for axes, (name, (s, d)) in zip(panels, maps.items(), strict=True):
-            show_map(axes, s, extent)
-            rgba = np.zeros((*d.shape, 4))
-            rgba[d > 0.9] = (*(int(style.VERMILION[i : i + 2], 16) / 255 for i in (1, 3, 5)), 1.0)
-            axes.imshow(rgba, origin="lower", extent=extent, resample=False)
-            rows, columns = d.shape
-            x = np.linspace(extent[0], extent[1], columns + 1)
-            y = np.linspace(extent[2], extent[3], rows + 1)
-            axes.contour(
-                0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), truth.astype(float), [0.5],
-                colors=style.BLUE, linewidths=1.2,
-            )  # fmt: skip
-            axes.set_title(name)
+        figure, panels = style.new_figure(3.6, len(variants), sharey=True)
+        for v, (axes, name) in enumerate(zip(panels, variants, strict=True)):
+            axes.plot(since, 100 * static[v], color=style.BLACK, lw=2, label="in S")
+            axes.plot(since, 100 * dynamic[v], color=style.VERMILION, lw=2, ls="--", label="in D")
+            if name == "ageing":
+                axes.axvline(settle, color=style.GREY, lw=1, ls=(0, (2, 2)))
+                axes.annotate("T", (settle, 50), xytext=(4, 0), textcoords="offset points", color=style.GREY)
+            axes.set(title=f"{name} table", xlabel="time since it was put down [s]", xlim=(0, since[-1]))
+        panels[0].set_ylabel("share of its cells [%]")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
