@@ -173,9 +173,7 @@ def _named(value: Any, outputs: list[str]) -> dict[str, Any]:
     raise ValueError(f"expected an object with {', '.join(outputs)}")
 
 
-def _refused(
-    file: VectorFile, case: Case, reply: Reply, convention: Convention, profile: Profile
-) -> Outcome:
+def _refused(file: VectorFile, case: Case, reply: Reply, convention: Convention, profile: Profile) -> Outcome:
     """A case without an answer: an error or ``valid: false`` is right, a number is not."""
     said_no = isinstance(reply.value, dict) and reply.value.get("valid") in (False, 0)
     if reply.what == "error" or said_no:

@@ -32,7 +32,7 @@ def floats(value: Any) -> Any:
     """Nearest doubles, as nested lists."""
     if isinstance(value, mpmath.matrix):
         return [[float(value[i, j]) for j in range(value.cols)] for i in range(value.rows)]
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | np.ndarray):
         return [floats(v) for v in value]
     return float(value)
 

@@ -33,7 +33,7 @@ NOTES = {
         "I - hat(phi)/2",
     ),
     "uniform-angles": (
-        "your rotations are not uniform: with a uniform angle about a uniform axis, E (tr R)^2 = 2",
+        "your rotations are not uniform: with a uniform angle about a uniform axis, E tr R = 1, E (tr R)^2 = 3",
         "R = Exp(a n) with a uniform in (0, 2 pi)",
     ),
 }
@@ -203,11 +203,18 @@ def _random(topic: Topic) -> None:
         "mean_squared_trace": (1.0 - z * 2.0**0.5, 1.0 + z * 2.0**0.5, false_alarm),
         "worst_orthogonality": (0.0, 1e-12, 0.0),
     }
+    # tr R = 1 + 2 cos a with a uniform: mean 1, variance 2; its square: mean 3, variance 10, taken as 16
+    uneven = {
+        "mean_trace": {"low": 1.0 - z * 2.0**0.5, "high": 1.0 + z * 2.0**0.5},
+        "mean_squared_trace": {"low": 3.0 - 4.0 * z, "high": 3.0 + 4.0 * z},
+    }
     for measure, (low, high, rate) in bands.items():
-        rule = {
+        rule: dict[str, Any] = {
             **{"output": "R", "measure": measure, "samples": samples},
             **{"low": low, "high": high, "false_alarm": rate},
         }
+        if measure in uneven:
+            rule["mistakes"] = {"uniform-angles": uneven[measure]}
         case = {"inputs": {"N": samples}, "expected": {"R": []}}
         oracle = "characters of SO(3)"
         flags = ("statistical", measure)

@@ -31,7 +31,8 @@ TABLE: Answers = {
     "sim3.adjoint": lambda S: sim3.adjoint(S),
     "so2.exp": lambda angle: so2.exp(angle),
     "so2.wrap": lambda angle: so2.wrap(angle),
-    **{f"se2.{name}": getattr(se2, name) for name in ("exp", "log", "compose", "left_jacobian")},
+    **{f"se2.{name}": getattr(se2, name) for name in ("exp", "compose", "left_jacobian")},
+    "se2.log": lambda x: se2.log(x),
     "se2.inverse": lambda x: se2.inverse(x),
     "se2.adjoint": lambda x: se2.adjoint(x),
 }

@@ -1,0 +1,215 @@
+"""One step of Gauss-Newton and of Levenberg-Marquardt, and whole runs: normal equations in 50 digits."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from vslam_ref.conformance.generator.building import Topic, tolerance
+from vslam_ref.conformance.generator.exact import column, floats, matrix, vector
+
+TOPIC, CHAPTER = "least_squares", 5
+Array = NDArray[np.float64]
+NORMAL = "normal equations in 50 digits"
+
+NOTES = {
+    "uphill": ("your step goes uphill: the residual's sign, or the step's", "+(J^T J)^-1 J^T r"),
+    "gradient-step": ("your step is the bare gradient: J^T J is missing", "-J^T r"),
+    "scale-not-squared": ("you damp with diag(scale); it must be its square", "J^T J + lambda diag(scale)"),
+    "scale-ignored": ("your damping ignores the scale", "J^T J + lambda I"),
+    "damping-squared": ("you square the damping", "J^T J + lambda^2 diag(scale)^2"),
+    "marquardt-diagonal": ("you damp with the diagonal of J^T J", "J^T J + lambda diag(J^T J)"),
+    "not-damped": ("your step is not damped", "J^T J step = -J^T r"),
+    "always-taken": ("you take a step although the cost rises", "b <- b + step, always"),
+    "cost-not-halved": ("your cost is |r|^2; it is half of it", "|r|^2"),
+    "damping-late": ("you use each damping one step too late", "lambda of the step before"),
+}
+
+
+def build(rng: np.random.Generator) -> Topic:
+    """Steps, and runs."""
+    topic = Topic(CHAPTER, TOPIC)
+    for identity, (meaning, formula) in NOTES.items():
+        topic.note(identity, meaning, formula)
+    reason = (
+        "condition of J, below 1e2, squared as in the normal equations, times eps and some ten operations"
+    )
+    fine = tolerance(1e-11, reason, float32=1e-2)
+    ill = "the square of the condition of J, 1e4, times eps: normal equations are allowed"
+    hard = tolerance(1e-7, ill, float32=1e-2)
+    some = [_system(rng, int(rng.integers(4, 9)), int(rng.integers(2, 4)), 10.0) for _ in range(15)]
+    topic.group(
+        "least_squares.gauss_newton_step", "eq-normal", NORMAL, fine, [_gauss_newton(*s) for s in some]
+    )
+    square = [_system(rng, 3, 3, 10.0) for _ in range(5)]
+    cases = [_gauss_newton(*s) for s in square]
+    topic.group("least_squares.gauss_newton_step", "eq-normal", NORMAL, fine, cases, flags=("square",))
+    bad = [_system(rng, 8, 3, 1e4) for _ in range(8)]
+    cases = [_gauss_newton(*s) for s in bad]
+    topic.group(
+        "least_squares.gauss_newton_step", "eq-normal", NORMAL, hard, cases, flags=("ill_conditioned",)
+    )
+    cases = [_singular(rng) for _ in range(4)]
+    topic.group(
+        "least_squares.gauss_newton_step", "eq-normal", "definition", fine, cases, flags=("degenerate",)
+    )
+    for flag, (low, high) in {
+        "small_damping": (1e-6, 1e-3),
+        "damped": (0.05, 5.0),
+        "large_damping": (1e3, 1e6),
+    }.items():
+        cases = [_damped(*s, float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng) for s in some[:10]]
+        topic.group("least_squares.lm_step", "eq-damped", NORMAL, fine, cases, flags=(flag,))
+    cases = [_damped(*_rank_one(rng), float(rng.uniform(0.1, 2.0)), rng) for _ in range(5)]
+    topic.group("least_squares.lm_step", "eq-damped", NORMAL, fine, cases, flags=("degenerate",))
+    reason = "a dozen steps, each of condition below 1e4, times eps"
+    long = tolerance(1e-10, reason, float32=1e-2)
+    for flag, damping in RUNS.items():
+        cases = [_trace(rng, damping) for _ in range(4)]
+        oracle = "straight-line Levenberg-Marquardt in 50 digits"
+        topic.group("least_squares.lm_trace", "eq-damped", oracle, long, cases, flags=("trace", flag))
+    return topic
+
+
+RUNS = {
+    "constant": [0.3] * 10,
+    "falling": [10.0 * 0.5**k for k in range(10)],
+    "refusing": [3.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 0.3, 0.3, 0.3, 0.3],
+}
+"""Flag -> damping of each step."""
+
+
+def _system(rng: np.random.Generator, m: int, n: int, condition: float) -> tuple[Array, Array]:
+    """Jacobian of a given condition, and residual."""
+    U = np.linalg.qr(rng.standard_normal((m, n)))[0]
+    V = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    return U * np.geomspace(condition, 1.0, n) @ V.T, rng.standard_normal(m)
+
+
+def _rank_one(rng: np.random.Generator) -> tuple[Array, Array]:
+    """Columns that are multiples of one another, by powers of two so that this is exact."""
+    column_ = rng.standard_normal(5)
+    return np.stack([column_, 2 * column_, -0.5 * column_], 1), rng.standard_normal(5)
+
+
+def _solve(J: Any, r: Any, extra: Any = None) -> Any:
+    """(J^T J + extra)^-1 (-J^T r)."""
+    H = J.T * J
+    return mpmath.lu_solve(H if extra is None else H + extra, -(J.T * r))
+
+
+def _gauss_newton(J: Array, r: Array) -> dict[str, Any]:
+    A, b = matrix(J), mpmath.matrix(vector(r))
+    step = _solve(A, b)
+    wrong = {"uphill": -step, "gradient-step": -(A.T * b)}
+    return _case({"J": J, "r": r}, step, wrong)
+
+
+def _singular(rng: np.random.Generator) -> dict[str, Any]:
+    J, r = _rank_one(rng)
+    return {"inputs": {"J": J, "r": r}, "expected": {}, "result": "invalid"}
+
+
+def _damped(J: Array, r: Array, damping: float, rng: np.random.Generator) -> dict[str, Any]:
+    A, b = matrix(J), mpmath.matrix(vector(r))
+    scale = rng.uniform(0.3, 4.0, J.shape[1])
+    d, lam = vector(scale), mpf(damping)
+
+    def diagonal(values: list[Any]) -> Any:
+        return mpmath.diag(values)
+
+    step = _solve(A, b, diagonal([lam * v**2 for v in d]))
+    H = A.T * A
+    candidates = {
+        "uphill": -step,
+        "scale-not-squared": _solve(A, b, diagonal([lam * v for v in d])),
+        "scale-ignored": _solve(A, b, diagonal([lam for _ in d])),
+        "damping-squared": _solve(A, b, diagonal([lam**2 * v**2 for v in d])),
+        "marquardt-diagonal": _solve(A, b, diagonal([lam * H[i, i] for i in range(H.rows)])),
+    }
+    if np.linalg.matrix_rank(J) == J.shape[1]:
+        candidates["not-damped"] = _solve(A, b)
+    size = mpmath.norm(step, mpmath.inf)
+    wrong = {
+        note: s for note, s in candidates.items() if mpmath.norm(s - step, mpmath.inf) > mpf("1e-7") * size
+    }
+    return _case({"J": J, "r": r, "damping": damping, "scale": scale}, step, wrong)
+
+
+def _case(inputs: dict[str, Any], step: Any, wrong: dict[str, Any]) -> dict[str, Any]:
+    mistakes = {note: {"step": floats(column(s))} for note, s in wrong.items()}
+    return {"inputs": inputs, "expected": {"step": floats(column(step))}, "mistakes": mistakes}
+
+
+def _trace(rng: np.random.Generator, damping: list[float]) -> dict[str, Any]:
+    """Draw until no decision hangs on rounding; runs of a list that refuses must refuse."""
+    refusing = min(damping) < 1e-3
+    while True:
+        t = np.linspace(0.0, 4.0, 8)
+        y = rng.uniform(2.0, 4.0) * np.exp(-rng.uniform(0.5, 1.5) * t) + 0.05 * rng.standard_normal(8)
+        start = np.array(
+            [rng.uniform(0.5, 1.5), rng.uniform(2.0, 5.0) if refusing else rng.uniform(0.1, 0.4)]
+        )
+        steps, clear = _run(y, t, start, damping)
+        if clear and refusing == any(not s["taken"] for s in steps):
+            break
+    runs: dict[str, Any] = {
+        "marquardt-diagonal": lambda: _run(y, t, start, damping, rule="diagonal")[0],
+        "not-damped": lambda: _run(y, t, start, [0.0] * len(damping))[0],
+        "cost-not-halved": lambda: [{**s, "cost": 2 * s["cost"]} for s in steps],
+    }
+    if refusing:
+        runs["always-taken"] = lambda: _run(y, t, start, damping, always=True)[0]
+    if len(set(damping)) > 1:
+        runs["damping-late"] = lambda: _run(y, t, start, [damping[0], *damping[:-1]])[0]
+    mistakes = {}
+    for note, run in runs.items():
+        with contextlib.suppress(ZeroDivisionError):  # a wrong rule may lead anywhere; only what ends is told
+            found = run()
+            if all(abs(v) < 1e6 for s in found for v in s["b"]):
+                mistakes[note] = {"steps": [_record(s) for s in found]}
+    inputs = {"y": y, "t": t, "start": start, "damping": damping}
+    return {"inputs": inputs, "expected": {"steps": [_record(s) for s in steps]}, "mistakes": mistakes}
+
+
+def _record(step: dict[str, Any]) -> dict[str, Any]:
+    return {"b": floats(step["b"]), "cost": float(step["cost"]), "taken": int(step["taken"])}
+
+
+def _run(
+    y: Array, t: Array, start: Array, damping: list[float], *, rule: str = "identity", always: bool = False
+) -> tuple[list[dict[str, Any]], bool]:
+    """One record a step, and whether every decision was clear.
+
+    Clear is a step whose gain, what it wins over what the model promises, is above 0.01 or below 0, and which
+    promises more than 1e-9 of the cost: then rounding, and any sensible threshold, decide alike.
+    """
+    ts, ys = vector(t), vector(y)
+    b, clear, steps = vector(start), True, []
+
+    def residual(at: list[Any]) -> Any:
+        return mpmath.matrix([at[0] * mpmath.exp(-at[1] * s) - v for s, v in zip(ts, ys, strict=True)])
+
+    for value in damping:
+        r = residual(b)
+        J = mpmath.matrix([[mpmath.exp(-b[1] * s), -b[0] * s * mpmath.exp(-b[1] * s)] for s in ts])
+        H, lam = J.T * J, mpf(value)
+        extra = mpmath.diag([lam * (H[i, i] if rule == "diagonal" else 1) for i in range(2)])
+        step = mpmath.lu_solve(H + extra, -(J.T * r))
+        trial = [b[0] + step[0], b[1] + step[1]]
+        cost, new = _half_square(r), _half_square(residual(trial))
+        promised = _half_square(J * step) + (step.T * extra * step)[0]
+        taken = new < cost or always
+        clear = clear and promised > mpf("1e-9") * cost and not 0 <= (cost - new) / promised < mpf("0.01")
+        b, cost = (trial, new) if taken else (b, cost)
+        steps.append({"b": list(b), "cost": cost, "taken": taken})
+    return steps, clear
+
+
+def _half_square(v: Any) -> Any:
+    return sum(x * x for x in v) / 2
