@@ -137,4 +137,4 @@ def test_weak_problems_are_named(file: Path, tmp_path: Path, capsys: pytest.Capt
     path = tmp_path / "weak.txt"
     path.write_text("\n".join([f"3 12 {len(kept)}", *kept, *lines[37:]]))
     assert main(["ba", str(path)]) == 0
-    assert "1 points are seen once" in capsys.readouterr().out
+    assert "points seen once, whose depth is not measured: 1 (first: 4)" in capsys.readouterr().out

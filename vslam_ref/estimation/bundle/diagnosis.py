@@ -47,16 +47,16 @@ class Diagnosis(NamedTuple):
         --------
         >>> none = np.zeros(0, dtype=np.int64)
         >>> Diagnosis(none, np.array([3, 8]), none, none, none, 1).sentences()
-        ['2 points are seen once, their depth is not measured (first: 3)']
+        ['points seen once, whose depth is not measured: 2 (first: 3)']
         """
         told = (
-            (self.unseen_points, "points have no observation and stay"),
-            (self.once_seen_points, "points are seen once, their depth is not measured"),
-            (self.empty_views, "views have no observation and stay"),
-            (self.weak_views, "views see fewer than three points, which leaves their pose open"),
-            (self.behind, "observations have their point behind the camera"),
+            ("points without an observation, which stay", self.unseen_points),
+            ("points seen once, whose depth is not measured", self.once_seen_points),
+            ("views without an observation, which stay", self.empty_views),
+            ("views that see fewer than three points, which leaves their pose open", self.weak_views),
+            ("observations of a point behind the camera", self.behind),
         )
-        found = [f"{len(which)} {words} (first: {which[0]})" for which, words in told if len(which)]
+        found = [f"{words}: {len(which)} (first: {which[0]})" for words, which in told if len(which)]
         if self.parts > 1:
             found.append(f"the views fall into {self.parts} groups that no point ties together")
         return found

@@ -74,7 +74,8 @@ def point_factor(C: Array, extra: Array, free: BoolArray) -> Array:
     Notes
     -----
     The Cholesky factor L and its inverse are written out.  A point whose matrix is singular to working
-    precision is not measured in some direction: it stays where it is.
+    precision is not measured in some direction: it gets no step.  With damping that is a point without weight
+    only; one that was seen once moves onto its ray.
     """
     size = np.einsum("nii->ni", C) + extra
     c00, c11, c22 = size.T
