@@ -68,6 +68,37 @@ def test_damaged_files_give_a_record_or_one_line(name: str) -> None:
         assert tally.records > 0  # and not always deadly
 
 
+def swollen(data: bytes, size: int) -> list[bytes]:
+    """A file of about ``size`` bytes in which one thing comes again and again."""
+    lines = data.split(b"\n")
+    k = len(lines) // 2
+    words = (lines[k] + b"\n", b"x", b"1", b" ", b"\n", b"0 ", b"1\n", b"[", b"- ", b"a: b\n")
+    blobs = [word * (size // len(word)) for word in words]
+    inside = [b"\n".join([*lines[:k], blob, *lines[k:]]) for blob in blobs]
+    return [data * (size // len(data)), *inside, *(data + blob for blob in blobs)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n in SAMPLES if not all(s.binary for s in SAMPLES[n])])
+def test_a_large_file_takes_time_in_proportion(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that takes the square of a size takes minutes for a megabyte; all is 1 second at most here.
+
+    YAML's parser takes some 5 microseconds a byte, so these readers get less to read.
+    """
+    monkeypatch.setattr(fuzz_readers, "LIMIT", 60.0)
+    monkeypatch.setattr(fuzz_readers, "PROCESSOR", 5.0)
+    size = 2**17 if name.split(":")[0].endswith(("euroc", "kalibr", "opencv_yaml")) else 2**20
+    for sample in SAMPLES[name]:
+        with scratch() as root:
+            for file, content in sample.files.items():
+                (root / file).write_bytes(content)
+            for file in [] if sample.binary else sample.files:
+                for data in swollen(sample.files[file], size):
+                    (root / file).write_bytes(data)
+                    assert judge(name, sample, root)[0] != "defect", (file, data[:100])
+                (root / file).write_bytes(sample.files[file])
+
+
 # --- the judge itself: it must see every kind of defect ---------------------------------------------
 
 
