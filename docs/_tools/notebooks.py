@@ -112,7 +112,7 @@ def small_png(text: str) -> str:
         flat = Image.new("RGB", picture.size, "white")
         flat.paste(picture, mask=picture.getchannel("A") if "A" in picture.getbands() else None)
     packed = io.BytesIO()
-    flat.quantize(256, dither=Image.Dither.NONE).save(packed, "PNG", optimize=True)
+    flat.quantize(256, kmeans=4, dither=Image.Dither.NONE).save(packed, "PNG", optimize=True)
     return base64.b64encode(min(packed.getvalue(), data, key=len)).decode() + "\n"
 
 
