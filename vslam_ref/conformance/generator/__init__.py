@@ -11,7 +11,19 @@ import importlib
 import pkgutil
 from types import ModuleType
 
-HELPERS = ("exact", "building", "writing", "exact_arrays", "exact_ekf", "exact_lift", "world", "groups", "lenses", "similarity")
+HELPERS = (
+    "exact",
+    "building",
+    "writing",
+    "exact_arrays",
+    "exact_ekf",
+    "exact_lift",
+    "world",
+    "groups",
+    "lenses",
+    "similarity",
+    "views",
+)
 
 
 def topics() -> dict[str, ModuleType]:

@@ -1,0 +1,394 @@
+"""Occupancy grids: log odds, the recursion of chapter 4 of A, the maps S and D, and the cells of a ray."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise, product
+from math import floor
+from typing import Any
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from vslam_ref.conformance.generator.building import Topic, tolerance
+
+TOPIC, CHAPTER = "grid", 19
+Array = NDArray[np.float64]
+DEFINITION = "definition, 50 digits"
+Cell = tuple[int, int]
+
+NOTES = {
+    "odds": ("your value is the odds; its logarithm was asked for", "p/(1 - p)"),
+    "log-of-p": ("your value is the logarithm of the probability", "ln p"),
+    "base-ten": ("your logarithm has base ten", "log10(p/(1 - p))"),
+    "base-two": ("your logarithm has base two", "log2(p/(1 - p))"),
+    "free-for-occupied": ("your probability is that of the complement", "1/(1 + exp(L))"),
+    "overflow": ("your exponential overflows: infinity over infinity", "exp(L)/(1 + exp(L))"),
+    "prior-counted-twice": (
+        "your prior counts twice: a table conditioned on S_t-1 holds its odds, and they come once more",
+        "L(S_t | o_t, S_t-1) + L(S_t-1), the first with the prior in it",
+    ),
+    "probabilities-multiplied": ("you multiply probabilities where odds multiply", "logit(p q)"),
+    "probabilities-averaged": ("you average the probabilities", "logit((p + q)/2)"),
+    "memory-lost": ("your cell forgets what it knew", "L = logit(measured)"),
+    "recursion-printed": (
+        "your recursion is the printed one with a table that holds the prior: the state doubles at each step",
+        "L <- (e + L) + L",
+    ),
+    "d-remembers": (
+        "your D remembers, as the formula A4.3 has it; d_memory 'text' was asked for",
+        "L(D_t) = L(D | o_t, S_t-1) + L(D_t-1)",
+    ),
+    "d-forgets": (
+        "your D starts anew, as the text at A4.3 has it; d_memory 'formula' was asked for",
+        "L(D_t) = L(D | o_t, S_t-1)",
+    ),
+    "d-high-elsewhere": (
+        "your D is high where S was unknown for free, or free for unknown: the other of the two readings",
+        "d_high at the other d_high_where",
+    ),
+    "state-after": (
+        "you look the table up with S after the observation; it is S_t-1",
+        "row of the table from S_t",
+    ),
+    "not-bounded": ("your log odds pass the bound", "no clipping"),
+    "s-ignores-state": ("your S takes every hit as s_high, on free floor, too", "s_high for s_low"),
+    "bresenham": (
+        "your cells are those of Bresenham's line, one for each column or row: it leaves cells out",
+        "rounding of the minor axis",
+    ),
+    "columns-for-rows": ("your cells are (row, column); (x, y) was asked for", "(j, i)"),
+    "end-cell-missing": ("your last cell is missing", "all cells but the last"),
+    "corners-count": (
+        "your cells hold those that the segment touches in a corner only",
+        "closed squares for half-open ones",
+    ),
+    "backwards": ("your cells run from the end to the start", "reversed"),
+}
+
+
+def build(rng: np.random.Generator) -> Topic:
+    """All groups of grids."""
+    topic = Topic(CHAPTER, TOPIC)
+    for identity, (meaning, formula) in NOTES.items():
+        topic.note(identity, meaning, formula)
+    _log_odds(topic, rng)
+    _probabilities(topic, rng)
+    _recursion(topic, rng)
+    _two_maps(topic, rng)
+    _rays(topic, rng)
+    return topic
+
+
+def logit(p: Any) -> Any:
+    """Log odds of a double, or of a 50-digit number."""
+    p = mpf(p)
+    return mpmath.log(p / (1 - p))
+
+
+def _answers(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
+    """A case of one number, and the wrong formulas that give another one."""
+    far = {n: v for n, v in wrong.items() if not abs(v - right) < mpf("1e-6") * (1 + abs(right))}
+    case: dict[str, Any] = {"inputs": inputs, "expected": {name: float(right)}}
+    return {**case, "mistakes": {n: {name: float(v)} for n, v in far.items()}} if far else case
+
+
+# -- log odds --------------------------------------------------------------------------------------
+
+
+def _log_odds(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-15, "two logarithms, each within an eps", absolute=2.3e-16)
+    half = "p is 1/2 but for a little: the difference of two logarithms near ln 1/2 is right to eps, absolute"
+    near_half = tolerance(0.0, half, absolute=2.3e-16)
+    one = tolerance(1e-15, "1 - p is exact")
+    regimes: dict[str, tuple[Callable[[], float], Any]] = {
+        "": (lambda: float(rng.uniform(0.05, 0.95)), rule),
+        "near_zero": (lambda: float(10.0 ** rng.uniform(-300, -3)), rule),
+        "near_one": (lambda: 1.0 - float(2.0 ** -rng.integers(8, 53)), one),
+        "near_half": (lambda: 0.5 + float(rng.choice([-1, 1]) * 10.0 ** rng.uniform(-14, -3)), near_half),
+    }
+    for flag, (draw, allowed) in regimes.items():
+        cases = [_one_log_odds(draw()) for _ in range(15)]
+        flags = (flag,) if flag else ()
+        topic.group("grid.log_odds", "eq-odds-recursion", DEFINITION, allowed, cases, flags=flags)
+    cases = [
+        {"inputs": {"probability": p}, "expected": {}, "result": "invalid"} for p in (-0.1, 1.1, "nan", 2.0)
+    ]
+    topic.group("grid.log_odds", "eq-odds-recursion", "definition", rule, cases, flags=("degenerate",))
+
+
+def _one_log_odds(p: float) -> dict[str, Any]:
+    right = logit(p)
+    odds = mpf(p) / (1 - mpf(p))
+    wrong = {
+        **{"odds": odds, "log-of-p": mpmath.log(p)},
+        **{"base-ten": mpmath.log10(odds), "base-two": mpmath.log(odds, 2)},
+    }
+    return _answers({"probability": p}, "value", right, wrong)
+
+
+def _probabilities(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-15, "an exponential, rounded by eps times |L| at most 30")
+    small = tolerance(1e-12, "exp of a rounded L is wrong by eps times |L|, below 700", float32=1e-3)
+    regimes: dict[str, tuple[Callable[[], float], Any]] = {
+        "": (lambda: float(rng.uniform(-4, 4)), rule),
+        "sure": (lambda: float(rng.uniform(10, 36)), rule),
+        "unlikely": (lambda: -float(rng.uniform(10, 600)), small),
+    }
+    for flag, (draw, allowed) in regimes.items():
+        cases = [_one_probability(draw()) for _ in range(15)]
+        flags = (flag,) if flag else ()
+        topic.group("grid.probability", "eq-odds-recursion", DEFINITION, allowed, cases, flags=flags)
+    cases = [_one_probability(L) for L in (0.0, 709.0, 800.0, 1e4, -1e4, 1e300, -1e300)]
+    exact = tolerance(0.0, "1, 0 or 1/2 to the last digit", absolute=1e-300)
+    topic.group("grid.probability", "eq-odds-recursion", DEFINITION, exact, cases, flags=("huge",))
+
+
+def _one_probability(L: float) -> dict[str, Any]:
+    right = 1 / (1 + mpmath.exp(-mpf(L)))
+    wrong = {"free-for-occupied": 1 - right}
+    if L > 709.8:
+        wrong["overflow"] = mpf("nan")
+    return _answers({"log_odds": L}, "value", right, wrong)
+
+
+# -- recursion -------------------------------------------------------------------------------------
+
+
+def _recursion(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-14, "two log odds and a sum", absolute=1e-15)
+    draws: dict[str, Callable[[], Array]] = {
+        "": lambda: rng.uniform(0.05, 0.95, 2),
+        "sure": lambda: 1 - rng.uniform(1e-6, 0.02, 2),
+    }
+    for flag, draw in draws.items():
+        cases = [_one_update(*np.round(draw(), 7).tolist()) for _ in range(15)]
+        topic.group("grid.update", "eq-a4-2", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+    cases = [_follow(round(rng.uniform(-2, 2), 3), np.round(rng.normal(0.5, 1.2, 8), 3)) for _ in range(12)]
+    topic.group("grid.follow", "eq-odds-recursion", DEFINITION, rule, cases)
+
+
+def _one_update(prior: float, measured: float) -> dict[str, Any]:
+    p, q = mpf(prior), mpf(measured)
+    wrong = {
+        "prior-counted-twice": 2 * logit(p) + logit(q),
+        "probabilities-multiplied": logit(p * q),
+        "probabilities-averaged": logit((p + q) / 2),
+        "memory-lost": logit(q),
+    }
+    return _answers({"prior": prior, "measured": measured}, "log_odds", logit(p) + logit(q), wrong)
+
+
+def _follow(start: float, evidence: Array) -> dict[str, Any]:
+    right, printed, lost = [], [], []
+    now = twice = mpf(start)
+    for e in map(mpf, evidence.tolist()):
+        now, twice = now + e, (e + twice) + twice
+        right.append(now)
+        printed.append(twice)
+        lost.append(e)
+    wrong = {"recursion-printed": printed, "memory-lost": lost}
+    mistakes = {name: {"log_odds": [float(v) for v in values]} for name, values in wrong.items()}
+    inputs = {"start": start, "evidence": evidence}
+    return {"inputs": inputs, "expected": {"log_odds": [float(v) for v in right]}, "mistakes": mistakes}
+
+
+# -- S and D ---------------------------------------------------------------------------------------
+
+TABLE = {"s_high": 0.8, "s_low": 0.3, "s_miss": 0.35, "d_high": 0.95, "d_low": 0.1, "d_miss": 0.05}
+MOST = {"s": 0.999, "d": 0.96}
+S_BEFORE = {"free": -3.0, "unknown": 0.7, "occupied": 2.9}
+OTHER = {"free": "unknown", "unknown": "free"}
+
+
+def _two_maps(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-14, "log odds of the table and a sum", absolute=1e-15)
+    for memory, where in product(("formula", "text"), ("free", "unknown")):
+        cases = []
+        for state, seen in product(S_BEFORE, ("hit", "miss")):
+            s = round(S_BEFORE[state] + rng.uniform(-0.6, 0.6), 3)
+            cases.append(_cell(s, round(rng.uniform(-2, 2), 3), seen, memory, where))
+        flags = (f"memory_{memory}", f"high_where_{where}")
+        label = "eq-a4-3"
+        topic.group("grid.static_dynamic", label, DEFINITION, rule, cases, flags=flags)
+    cases = [
+        _cell(s, d, seen, "formula", "free")
+        for s, d, seen in ((6.5, 3.0, "hit"), (-6.8, -3.1, "miss"), (-6.8, 2.9, "hit"))
+    ]
+    topic.group("grid.static_dynamic", "eq-a4-2", DEFINITION, rule, cases, flags=("bounded",))
+    edge = float(logit(mpf(9) / 10))
+    cases = [
+        _cell(sign * edge * factor, 0.5, "hit", "formula", "free")
+        for sign, factor in product((-1, 1), (0.999999, 1.000001))
+    ]
+    topic.group("grid.static_dynamic", "eq-a4-2", DEFINITION, rule, cases, flags=("threshold",))
+
+
+def both_maps(s: float, d: float, seen: str, memory: str, where: str, wrong: str = "") -> tuple[Any, Any]:
+    """Log odds of S and D after an observation."""
+    before = mpf(s)
+    state = _state(before)
+    of_s, of_d = _entries(state, seen, where if wrong != "d-high-elsewhere" else OTHER[where])
+    if wrong == "s-ignores-state" and seen == "hit":
+        of_s = "s_high"
+    if wrong == "state-after":
+        later = _state(before + logit(TABLE[of_s]))
+        of_s, of_d = _entries(later, seen, where)
+    remembers = (memory == "formula") != (wrong in ("d-remembers", "d-forgets"))
+    new_s = before + logit(TABLE[of_s])
+    new_d = (mpf(d) if remembers else mpf(0)) + logit(TABLE[of_d])
+    if wrong == "not-bounded":
+        return new_s, new_d
+    return _bounded(new_s, MOST["s"]), _bounded(new_d, MOST["d"])
+
+
+def _state(s: Any) -> str:
+    p = 1 / (1 + mpmath.exp(-s))
+    return "occupied" if p > mpf(9) / 10 else "free" if p < mpf(1) / 10 else "unknown"
+
+
+def _entries(state: str, seen: str, where: str) -> tuple[str, str]:
+    if seen == "miss":
+        return "s_miss", "d_miss"
+    return "s_low" if state == "free" else "s_high", "d_high" if state == where else "d_low"
+
+
+def _bounded(value: Any, most: float) -> Any:
+    bound = logit(most)
+    return max(-bound, min(bound, value))
+
+
+def _cell(s: float, d: float, seen: str, memory: str, where: str) -> dict[str, Any]:
+    right = both_maps(s, d, seen, memory, where)
+    mistakes: dict[str, Any] = {}
+    swap = "d-forgets" if memory == "formula" else "d-remembers"
+    for name in (swap, "d-high-elsewhere", "s-ignores-state", "state-after", "not-bounded"):
+        wrong = both_maps(s, d, seen, memory, where, name)
+        known = any(max(abs(a - b) for a, b in zip(wrong, other, strict=True)) < 1e-6 for other in [right])
+        same = {"s": float(wrong[0]), "d": float(wrong[1])}
+        if not known and same not in mistakes.values():
+            mistakes[name] = same
+    inputs: dict[str, Any] = {"s": s, "d": d, "observation": seen, "table": TABLE}
+    inputs = {**inputs, "d_memory": memory, "d_high_where": where, "most": MOST}
+    case: dict[str, Any] = {"inputs": inputs, "expected": {"s": float(right[0]), "d": float(right[1])}}
+    return {**case, "mistakes": mistakes} if mistakes else case
+
+
+# -- rays ------------------------------------------------------------------------------------------
+
+Ray = tuple[Array, Array]
+GRAIN = 64
+"""Ends of rays are multiples of 1/64 of a cell: exact in single precision, too."""
+
+
+def _rays(topic: Topic, rng: np.random.Generator) -> None:
+    exact = tolerance(0.0, "whole numbers")
+    regimes: dict[str, tuple[int, Callable[[], Ray]]] = {
+        "": (20, lambda: (_point(rng, 12), _point(rng, 12))),
+        "steep": (12, lambda: _steep(rng)),
+        "long": (
+            6,
+            lambda: (_point(rng, 2), _point(rng, 2) + rng.integers(25, 40, 2) * rng.choice([-1, 1], 2)),
+        ),
+        "along_axis": (12, lambda: _along(rng, on_edge=False)),
+        "along_edge": (12, lambda: _along(rng, on_edge=True)),
+        "corners": (12, lambda: _diagonal(rng)),
+        "in_one_cell": (5, lambda: _inside(rng)),
+        "ends_on_edge": (12, lambda: (_point(rng, 6), rng.integers(-6, 7, 2).astype(float))),
+    }
+    for flag, (count, draw) in regimes.items():
+        cases = [_ray(*draw()) for _ in range(count)]
+        flags = (flag,) if flag else ()
+        oracle = "crossings as fractions, without rounding"
+        topic.group("grid.ray_cells", "eq-a4-2", oracle, exact, cases, flags=flags)
+
+
+def _point(rng: np.random.Generator, reach: int) -> Array:
+    return np.asarray(rng.integers(-reach * GRAIN, reach * GRAIN, 2) / GRAIN)
+
+
+def _steep(rng: np.random.Generator) -> Ray:
+    a = _point(rng, 4)
+    return a, a + np.array([rng.integers(-GRAIN, GRAIN) / GRAIN, rng.choice([-1, 1]) * rng.integers(5, 12)])
+
+
+def _along(rng: np.random.Generator, *, on_edge: bool) -> Ray:
+    a = _point(rng, 5)
+    b = a.copy()
+    axis = int(rng.integers(2))
+    if on_edge:
+        a[1 - axis] = b[1 - axis] = np.floor(a[1 - axis])
+    elif a[1 - axis] == np.floor(a[1 - axis]):
+        a[1 - axis] = b[1 - axis] = a[1 - axis] + 0.25
+    b[axis] += rng.choice([-1, 1]) * rng.integers(2 * GRAIN, 8 * GRAIN) / GRAIN
+    return a, b
+
+
+def _diagonal(rng: np.random.Generator) -> Ray:
+    """Through corners: the start lies on a line through grid points, of slope 1, 2 or 1/2."""
+    corner, step = rng.integers(-4, 5, 2), np.array([(1, 1), (1, 2), (2, 1)][int(rng.integers(3))])
+    step = step * rng.choice([-1, 1], 2)
+    a = corner - step * float(rng.integers(1, 4)) / 4
+    return a, a + step * float(rng.integers(2, 5))
+
+
+def _inside(rng: np.random.Generator) -> Ray:
+    cell = rng.integers(-4, 5, 2)
+    ends = rng.integers(1, GRAIN, (2, 2)) / GRAIN
+    return cell + ends[0], cell + ends[1]
+
+
+def cells_of(start: Array, end: Array) -> list[Cell]:
+    """Cells in which a part of positive length lies: cut the segment at all lines, look between the cuts."""
+    a = [Fraction(v) for v in start.tolist()]
+    step = [Fraction(v) - w for v, w in zip(end.tolist(), a, strict=True)]
+    cuts = {Fraction(0), Fraction(1)}
+    for origin, length in zip(a, step, strict=True):
+        if length:
+            low, high = sorted((origin, origin + length))
+            cuts |= {(line - origin) / length for line in range(floor(low), floor(high) + 2)}
+    inner = sorted(t for t in cuts if 0 <= t <= 1)
+    middles = [(t + u) / 2 for t, u in pairwise(inner)]
+    found = [(floor(a[0] + m * step[0]), floor(a[1] + m * step[1])) for m in middles]
+    return [cell for k, cell in enumerate(found) if k == 0 or cell != found[k - 1]]
+
+
+def bresenham(start: Array, end: Array) -> list[Cell]:
+    """One cell for each column, or row where the ray is steep."""
+    a, b = np.floor(start).astype(int), np.floor(end).astype(int)
+    n = int(np.abs(b - a).max())
+    return [tuple(int(v) for v in np.floor(a + (b - a) * k / max(n, 1) + 0.5)) for k in range(n + 1)]  # type: ignore[misc]
+
+
+def touched(cells: list[Cell]) -> list[Cell]:
+    """With the two neighbours of every corner that is passed."""
+    out = cells[:1]
+    for (i, j), (k, m) in pairwise(cells):
+        if i != k and j != m:
+            out += [(k, j), (i, m)]
+        out.append((k, m))
+    return out
+
+
+def _ray(start: Array, end: Array) -> dict[str, Any]:
+    right = cells_of(start, end)
+    wrong = {
+        "bresenham": bresenham(start, end),
+        "columns-for-rows": [(j, i) for i, j in right],
+        "end-cell-missing": right[:-1],
+        "corners-count": touched(right),
+        "backwards": right[::-1],
+    }
+    mistakes: dict[str, Any] = {}
+    for name, cells in wrong.items():
+        answer = {"cells": [list(cell) for cell in cells]}
+        if cells != right and cells and answer not in mistakes.values():
+            mistakes[name] = answer
+    case: dict[str, Any] = {
+        "inputs": {"start": start, "end": end},
+        "expected": {"cells": [list(c) for c in right]},
+    }
+    return {**case, "mistakes": mistakes} if mistakes else case

@@ -1,0 +1,73 @@
+"""The lift of a pose B14, and the pose that a lifted state stands for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.conformance.generator import exact_lift
+from vslam_ref.conformance.generator.building import Topic, tolerance
+from vslam_ref.conformance.generator.ekf import case, some
+from vslam_ref.conformance.generator.exact_arrays import big
+from vslam_ref.conformance.generator.world import covariance, random_pose
+
+TOPIC, CHAPTER = "lift", 16
+Array = NDArray[np.float64]
+DEFINITION = "definition in 50 digits, Jacobians by difference quotients"
+
+NOTES = {
+    "no-products": (
+        "the covariance of your lift ends with the first four states; the products have one, too",
+        "P_Z = 0 outside the first 4 rows and columns",
+    ),
+    "cos-before-sin": ("your lift has the cosine before the sine", "(x, y, c, s, c^2, s^2, ...)"),
+    "atan2-swapped": ("the arguments of your atan2 are swapped", "atan2(c, s)"),
+    "length-forgotten": (
+        "your heading's variance takes (s, c) for a unit vector",
+        "J = (c, -s) for (c, -s)/(s^2 + c^2)",
+    ),
+}
+
+
+def build(rng: np.random.Generator) -> Topic:
+    """All groups of lifts."""
+    topic = Topic(CHAPTER, TOPIC)
+    for identity, (meaning, formula) in NOTES.items():
+        topic.note(identity, meaning, formula)
+    _lifts(topic, rng)
+    _poses(topic, rng)
+    return topic
+
+
+def _lifts(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-14, "a dozen products", absolute=1e-17)
+    for flag, count in (("", 12), ("near_pi", 8), ("small_angle", 8)):
+        cases = []
+        for k in range(count):
+            x, P = random_pose(rng, flag)
+
+            def answer(wrong: str, x: Array = x, P: Array = P) -> Any:
+                return exact_lift.lifted_start(big(x), big(P), wrong=wrong)
+
+            names = some(["no-products", "cos-before-sin"], k, 1) if not flag else []
+            cases.append(case({"x": x, "P": P}, answer, names, ("Z", "P_Z")))
+        topic.group("lift.vehicle", "eq-b14", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+
+
+def _poses(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-14, "an arc tangent and a quotient", absolute=1e-16)
+    for flag, length in (("", 1.0), ("off_lift", 1.2), ("near_pi", 0.9)):
+        cases = []
+        for k in range(10):
+            x, _ = random_pose(rng, flag)
+            z = np.round([*x[:2], length * np.sin(x[2]), length * np.cos(x[2])], 6)
+            P = covariance(rng, np.array([0.3, 0.25, 0.1, 0.1]))
+
+            def answer(wrong: str, z: Array = z, P: Array = P) -> Any:
+                return exact_lift.pose(big(z), big(P), wrong=wrong)
+
+            names = some(["atan2-swapped", "length-forgotten"], k, 1)
+            cases.append(case({"z": z, "P": P}, answer, names))
+        topic.group("lift.pose", "eq-b5", DEFINITION, rule, cases, flags=(flag,) if flag else ())
