@@ -149,3 +149,13 @@ def test_the_gps_rule_keeps_most_fixes_and_only_positions() -> None:
     assert np.isnan(truth.poses[:, 2]).all()
     assert not truth.exact
     assert truth.lever.tolist() == [park.ANTENNA_AHEAD, 0.0]
+
+
+@pytest.mark.parametrize(
+    "line", ["LANDMARK 1 99999999999999999999 10 2 1 0 1", "ODOMETRY 3 1e30 1 0 0 1 0 0 1 0 1"]
+)
+def test_a_number_that_no_integer_holds_is_refused(park_folder: Path, line: str) -> None:
+    path = park_folder / "victoria_park.txt"
+    path.write_text(f"{path.read_text()}{line}\n")
+    with pytest.raises(FormatError, match=r":6: \w+ is 1e\+\d+; expected a whole number from 0 to 9e15"):
+        park.read_graph(path)
