@@ -9,11 +9,12 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
-from vslam_ref.conformance.generator import exact_ekf
 from vslam_ref.conformance.generator.building import Topic, tolerance
-from vslam_ref.conformance.generator.exact_arrays import big, doubles, inverse, jacobian, stack, wrap
+from vslam_ref.conformance.generator.exact_arrays import big, doubles, inverse, wrap
+from vslam_ref.conformance.generator.exact_quantiles import normal_quantile, quantile
+from vslam_ref.conformance.generator.random_answers import noise, runs
+from vslam_ref.conformance.generator.world import digits
 
 TOPIC, CHAPTER = "consistency", 17
 Array = NDArray[np.float64]
@@ -76,8 +77,8 @@ def build(rng: np.random.Generator) -> Topic:
     _nees(topic, rng)
     _pose_errors(topic, rng)
     _bands(topic, rng)
-    _noise(topic)
-    _runs(topic)
+    noise(topic)
+    runs(topic)
     return topic
 
 
@@ -105,16 +106,16 @@ def _nees(topic: Topic, rng: np.random.Generator) -> None:
 def _covariance(rng: np.random.Generator, d: int, condition: float) -> Array:
     Q, _ = np.linalg.qr(rng.standard_normal((d, d)))
     P = Q @ np.diag(np.geomspace(1.0, 1.0 / condition, d)) @ Q.T
-    return np.asarray((P + P.T) / 2)
+    return digits((P + P.T) / 2)
 
 
 def _scaled(rng: np.random.Generator, P: Array) -> Array:
     scale = 10.0 ** rng.integers(-5, 4, len(P))
-    return np.asarray(P * np.outer(scale, scale))
+    return digits(P * np.outer(scale, scale))
 
 
 def _value(rng: np.random.Generator, P: Array) -> dict[str, Any]:
-    error = np.linalg.cholesky(P) @ rng.standard_normal(len(P))
+    error = digits(np.linalg.cholesky(P) @ rng.standard_normal(len(P)), 6)
     e, C = big(error), big(P)
     right = e @ inverse(C) @ e
     wrong = {
@@ -167,17 +168,6 @@ def _error(truth: Array, estimate: Array) -> dict[str, Any]:
 # -- bands -----------------------------------------------------------------------------------------
 
 
-def quantile(dof: int, probability: Any) -> Any:
-    """Quantile of chi-squared: Newton's iteration on the incomplete gamma function, 50 digits."""
-    p, half = mpf(probability), mpf(dof) / 2
-    x = mpf(float(chi2.ppf(float(p), dof)))
-    for _ in range(6):
-        density = mpmath.exp((half - 1) * mpmath.log(x / 2) - x / 2 - mpmath.loggamma(half)) / 2
-        x -= (mpmath.gammainc(half, 0, x / 2, regularized=True) - p) / density
-    assert abs(mpmath.gammainc(half, 0, x / 2, regularized=True) - p) < mpf(10) ** -35
-    return x
-
-
 def _bands(topic: Topic, rng: np.random.Generator) -> None:
     oracle = "Newton's iteration on the incomplete gamma function, 50 digits"
     rule = tolerance(1e-10, "programs differ in their inverse of the incomplete gamma function", float32=1e-4)
@@ -210,8 +200,7 @@ def _bands(topic: Topic, rng: np.random.Generator) -> None:
 
 def _band(runs: int, dof: int, confidence: float) -> dict[str, Any]:
     tail = (1 - mpf(confidence)) / 2
-    z = mpf(float(norm.isf(float(tail))))
-    spread = z * mpmath.sqrt(2 * mpf(dof) / runs)
+    spread = normal_quantile(1 - tail) * mpmath.sqrt(2 * mpf(dof) / runs)
     values = {
         "": (quantile(runs * dof, tail) / runs, quantile(runs * dof, 1 - tail) / runs),
         "one-run": (quantile(dof, tail), quantile(dof, 1 - tail)),
@@ -242,107 +231,3 @@ def _edges(
     inputs = {"runs": runs, "dof": dof, "confidence": confidence}
     case: dict[str, Any] = {"inputs": inputs, "expected": right}
     return {**case, "mistakes": mistakes} if mistakes else case
-
-
-# -- distributions ---------------------------------------------------------------------------------
-
-FALSE_ALARM = 1e-4
-
-
-def _around(mean: float, variance: float, samples: int) -> dict[str, float]:
-    """Two-sided band of a mean of many independent samples (central limit)."""
-    half = float(norm.isf(FALSE_ALARM / 2)) * (variance / samples) ** 0.5
-    return {"low": mean - half, "high": mean + half}
-
-
-def _noise(topic: Topic) -> None:
-    """Moments of N(0, s^2): E x^2 = s^2, E x^4 = 3 s^4, and their variances from E x^8 = 105 s^8."""
-    samples = 4000
-    for s in (1.0, 0.25):
-        uniform = _around(1.8 * s**4, (9.0 - 1.8**2) * s**8, samples)
-        bands: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
-            "mean": (_around(0.0, s**2, samples), {}),
-            "mean_square": (_around(s**2, 2 * s**4, samples), _swapped(s, samples)),
-            "mean_fourth": (_around(3 * s**4, 96 * s**8, samples), {"uniform-noise": uniform}),
-        }
-        for measure, (band, mistakes) in bands.items():
-            rule: dict[str, Any] = {"output": "values", "measure": measure, "samples": samples, **band}
-            rule["false_alarm"] = FALSE_ALARM
-            if mistakes:
-                rule["mistakes"] = mistakes
-            case = {"inputs": {"N": samples, "sigma": s}, "expected": {"values": []}}
-            flags = ("statistical", measure, "unit" if s == 1.0 else "quarter")
-            oracle = "moments of the normal distribution"
-            topic.group(
-                "consistency.noise",
-                "eq-nees",
-                oracle,
-                tolerance(0.0, "a band"),
-                [case],
-                flags=flags,
-                statistic=rule,
-            )
-
-
-def _swapped(s: float, samples: int) -> dict[str, Any]:
-    """Bands of the mean square where sigma is taken for a variance."""
-    return {} if s == 1.0 else {"variance-for-sigma": _around(s, 2 * s**2, samples)}
-
-
-def _runs(topic: Topic) -> None:
-    """NEES of predictions whose noise is so small that the motion is linear within it.
-
-    For Gaussian errors NEES is chi-squared with 3: mean 3, E q^2 = 15, Var q = 6, Var q^2 = E q^4 - 15^2 with
-    E q^4 = 3 * 5 * 7 * 9 = 945.  Curvature adds (ds sigma_theta / sigma_x)^2 sigma_theta^2 < 1e-5.
-    """
-    samples = 20000
-    inputs = {
-        **{"N": samples, "x": [1.0, -2.0, 0.7], "P": np.diag([4e-6, 1e-6, 2.25e-6])},
-        **{"control": [6.0, 0.4], "cov_u": np.diag([4e-6, 1e-6]), "wheelbase": 1.5, "dt": 0.5},
-    }
-    wrong = {name: _inflated(inputs, name) for name in ("gtpg", "no-process-noise")}
-    bands = {
-        "mean": (_around(3.0, 6.0, samples), wrong),
-        "mean_square": (_around(15.0, 720.0, samples), {"uniform-noise": _uniform(inputs)}),
-    }
-    for measure, (band, mistakes) in bands.items():
-        rule = {"output": "nees", "measure": measure, "samples": samples, **band, "false_alarm": FALSE_ALARM}
-        oracle, none = "moments of chi-squared with 3 degrees of freedom", tolerance(0.0, "a band")
-        topic.group(
-            "consistency.runs",
-            "eq-nees-moments",
-            oracle,
-            none,
-            [{"inputs": inputs, "expected": {"nees": []}}],
-            flags=("statistical", measure),
-            statistic={**rule, "mistakes": mistakes},
-        )
-
-
-def _uniform(inputs: dict[str, Any]) -> dict[str, float]:
-    """Band of E q^2 where all five noises are uniform.
-
-    The whitened error is B w with B B^T = I and w of unit variance and fourth cumulant 9/5 - 3; so E q^2 is
-    15 - 6/5 sum h_k^2, h the diagonal of B^T B.  The variance is below that of Gaussian noise.
-    """
-    x, P, control, cov_u = (big(inputs[k]) for k in ("x", "P", "control", "cov_u"))
-    sizes = mpf(inputs["wheelbase"]), mpf(inputs["dt"])
-    inc = exact_ekf.increment(control, *sizes)
-    F = jacobian(lambda y: exact_ekf.moved(y, inc), x)
-    G = jacobian(lambda u: exact_ekf.moved(x, exact_ekf.increment(u, *sizes)), control)
-    roots = [[mpmath.sqrt(v) for v in np.diag(C)] for C in (P, cov_u)]  # both are diagonal
-    J = np.concatenate([F * stack(roots[0]), G * stack(roots[1])], 1)
-    h = np.diag(J.T @ inverse(J @ J.T) @ J)
-    return _around(15.0 - 1.2 * float(sum(h**2)), 720.0, int(inputs["N"]))
-
-
-def _inflated(inputs: dict[str, Any], wrong: str) -> dict[str, float]:
-    """Band of the mean NEES of errors of the right covariance C, measured with a wrong one W.
-
-    With A = W^-1 C it is a sum of chi-squared variables: mean tr A, variance 2 tr A^2.
-    """
-    x, P, control, cov_u = (big(inputs[k]) for k in ("x", "P", "control", "cov_u"))
-    args = x, P, control, cov_u, mpf(inputs["wheelbase"]), mpf(inputs["dt"])
-    C, W = exact_ekf.predict(*args)[1], exact_ekf.predict(*args, wrong=wrong)[1]
-    A = inverse(W) @ C
-    return _around(float(np.trace(A)), float(2 * np.trace(A @ A)), int(inputs["N"]))
