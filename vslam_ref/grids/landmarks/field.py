@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.geometry import se2
+from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid
 
 Array = NDArray[np.float64]
@@ -42,17 +42,18 @@ class DistanceField:
 
 
 class Sampled(NamedTuple):
-    """Value (n,) of a field at points, and its Jacobian (n, 2) in the point."""
+    """Value (...,) of a field at points, and its gradient (..., 2)."""
 
     value: Array
-    J_point: Array
+    slope: Array
 
 
 class Residuals(NamedTuple):
-    """Value (n,) of scan points' distances, and its Jacobian (n, 3) in the pose's (x, y, theta)."""
+    """Value (..., 1) Jacobians in the pose's (x, y, theta) (..., 1, 3), in the scan point (..., 1, 2)."""
 
     value: Array
     J_pose: Array
+    J_point: Array
 
 
 def distance_field(grid: LogOddsGrid, most: float = 0.5) -> DistanceField:
@@ -81,48 +82,47 @@ def distance_field(grid: LogOddsGrid, most: float = 0.5) -> DistanceField:
     return DistanceField(grid.origin_xy, grid.resolution, np.minimum(distance, most), most)
 
 
-def sample(field: DistanceField, points: ArrayLike) -> Array:
-    """Distances (n,) at points (n, 2) of the world, metres.
+def sample(points: ArrayLike, field: DistanceField) -> Array:
+    """Distances (...,) at points (..., 2) of the world, metres; ``field.most`` outside of the map.
 
     Examples
     --------
     >>> field = DistanceField((0.0, 0.0), 1.0, np.array([[0.0, 1.0], [1.0, 1.4]]), 5.0)
-    >>> sample(field, [[0.5, 0.5], [1.0, 0.5], [9.0, 0.5]])
+    >>> sample([[0.5, 0.5], [1.0, 0.5], [9.0, 0.5]], field)
     array([0. , 0.5, 5. ])
     """
-    return sample_with_jacobians(field, points).value
+    return sampled(points, field).value
 
 
-def sample_with_jacobians(field: DistanceField, points: ArrayLike) -> Sampled:
+def sampled(points: ArrayLike, field: DistanceField) -> Sampled:
     """:func:`sample` and its slope; same parameters.  Outside the slope is 0."""
-    p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    p = np.asarray(points, dtype=np.float64)
     rows, columns = field.distance.shape
+    if rows < 2 or columns < 2:
+        return Sampled(np.full(p.shape[:-1], field.most), np.zeros(p.shape))
     at = (p - field.origin_xy) / field.resolution - 0.5
-    column, row = np.floor(at).astype(np.int64).T
+    column, row = np.floor(at[..., 0]).astype(np.int64), np.floor(at[..., 1]).astype(np.int64)
     inside = (column >= 0) & (column < columns - 1) & (row >= 0) & (row < rows - 1)
     i, j = np.where(inside, row, 0), np.where(inside, column, 0)
-    u, v = at[:, 0] - column, at[:, 1] - row
-    if rows < 2 or columns < 2:
-        return Sampled(np.full(len(p), field.most), np.zeros((len(p), 2)))
+    u, v = at[..., 0] - column, at[..., 1] - row
     d = field.distance
     d00, d01, d10, d11 = d[i, j], d[i, j + 1], d[i + 1, j], d[i + 1, j + 1]
     value = (1 - v) * ((1 - u) * d00 + u * d01) + v * ((1 - u) * d10 + u * d11)
-    slope = np.stack([(1 - v) * (d01 - d00) + v * (d11 - d10), (1 - u) * (d10 - d00) + u * (d11 - d01)], 1)
-    return Sampled(
-        np.where(inside, value, field.most), np.where(inside[:, None], slope / field.resolution, 0.0)
-    )
+    slope = np.stack([(1 - v) * (d01 - d00) + v * (d11 - d10), (1 - u) * (d10 - d00) + u * (d11 - d01)], -1)
+    slope = np.where(inside[..., None], slope / field.resolution, 0.0)
+    return Sampled(np.where(inside, value, field.most), slope)
 
 
 def scan_residuals(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Array:
-    """Distances (n,) of scan points from what is static.
+    """Distances (..., 1) of scan points from what is static.
 
     Implements :eq:`eq-field-residual`.
 
     Parameters
     ----------
-    pose : array_like, shape (3,)
+    pose : array_like, shape (..., 3)
         ``T_world_laser`` as (x, y, theta).
-    points : array_like, shape (n, 2)
+    points : array_like, shape (..., 2)
         In the laser's frame, metres.
     field : DistanceField
     """
@@ -130,10 +130,12 @@ def scan_residuals(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> 
 
 
 def scan_residuals_with_jacobians(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Residuals:
-    """:func:`scan_residuals` and its Jacobian in (x, y, theta), the filter's coordinates; same parameters."""
+    """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters."""
     pose, points = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
     world = se2.act(pose, points)
-    at = sample_with_jacobians(field, world)
-    lever = world - pose[:2]
-    turn = -at.J_point[:, 0] * lever[:, 1] + at.J_point[:, 1] * lever[:, 0]
-    return Residuals(at.value, np.column_stack([at.J_point, turn]))
+    at = sampled(world, field)
+    lever = world - pose[..., :2]
+    turn = at.slope[..., 1] * lever[..., 0] - at.slope[..., 0] * lever[..., 1]
+    J_pose = np.concatenate([at.slope, turn[..., None]], -1)
+    J_point = at.slope[..., None, :] @ so2.exp(pose[..., 2])
+    return Residuals(at.value[..., None], J_pose[..., None, :], J_point)

@@ -4,7 +4,7 @@
 
     corner seen --> candidate --(seen again 'confirm' times)--> static? apart? --> landmark
                                                                                       |
-        withdrawn <--(beams go through it, or S no longer holds it)-------------------'
+        withdrawn <--(beams go through it, and again, or S holds it no longer)--------'
 
 A landmark is chosen only where S is static: both arms decided, and a corner of S near.  Beside a landmark
 that looks the same no second one is set: the two would be mistaken for each other.
@@ -235,7 +235,9 @@ class LandmarkMap:
     def check(
         self, scan: int, pose: ArrayLike, places: Array, angles: Array, ranges: Array, static: LogOddsGrid
     ) -> list[Landmark]:
-        """Withdraw landmarks that this scan goes through, or that S no longer holds; return them.
+        """Withdraw landmarks that beams went through three times running, or once where S lost them.
+
+        S alone decides nothing: after a turn the landmarks move with the pose's correction, the map does not.
 
         Parameters
         ----------
@@ -255,7 +257,7 @@ class LandmarkMap:
             m.through = m.through + 1 if bool(went) else 0
             if m.through >= self.config.through:
                 m.withdrawn, m.why = scan, "seen through"
-            elif self.config.static_only and not holds:
+            elif self.config.static_only and bool(went) and not bool(holds):
                 m.withdrawn, m.why = scan, "no longer static in S"
             if m.withdrawn is not None:
                 gone.append(m)

@@ -252,8 +252,7 @@ def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | No
     Examples
     --------
     >>> beams = np.deg2rad(np.arange(-45.0, 46.0))
-    >>> ranges = 2.0 / np.cos(np.abs(beams) - np.pi / 4) * np.cos(np.pi / 4)  # two walls that meet
-    straight ahead
+    >>> ranges = np.sqrt(2.0) / np.cos(np.abs(beams) - np.pi / 4)  # two walls that meet ahead, at (2, 0)
     >>> found = scan_corners(beams, ranges)
     >>> found.xy.round(6), found.convex, np.rad2deg(found.opening).round(3)
     (array([[2., 0.]]), array([False]), array([90.]))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 FINE = 1e-4
 """Steps below this (m, rad) end the refinement: a hundredth of what the map resolves."""
 SHARES = (1.0, 0.5, 0.25, 0.125)
-"""Shares of a step that are tried.  Distances have kinks on walls: where no share goes down is the minimum."""
+"""Shares of a step that are tried.  Distances have kinks on walls; where no share goes down is a minimum."""
 Reason = Literal["converged", "too few points on the map", "no convergence"]
 
 
@@ -131,7 +131,7 @@ class Objective(NamedTuple):
         """Costs (k,) of poses (k, 3). Implements :eq:`eq-field-map`."""
         poses = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
         world = se2.act(poses[:, None], self.points)
-        d = sample(self.field, world).reshape(len(poses), -1)
+        d = sample(world, self.field)
         off = poses - self.predicted
         off[:, 2] = so2.wrap(off[:, 2])
         misfit = self.loss.cost(d).sum(axis=1) / self.sigma**2
@@ -199,12 +199,13 @@ def match_scan(
     now = float(o.cost(pose)[0])
     for iteration in range(1, c.iterations + 1):
         r = scan_residuals_with_jacobians(pose, points, field)
-        weight = o.loss.weight(r.value)
+        d, J = r.value[:, 0], r.J_pose[:, 0]
+        weight = o.loss.weight(d)
         inliers = int((weight > 0.5).sum())
         if inliers < c.least_points:
             return Match(predicted.copy(), np.zeros((3, 3)), inliers, iteration, "too few points on the map")
-        information = (r.J_pose * weight[:, None]).T @ r.J_pose / c.sigma**2
-        slope = r.J_pose.T @ (weight * r.value) / c.sigma**2 + o.prior @ _difference(pose, predicted)
+        information = (J * weight[:, None]).T @ J / c.sigma**2
+        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ _difference(pose, predicted)
         step = -np.linalg.solve(information + o.prior, slope)
         for share in SHARES:
             tried = pose + share * step

@@ -252,7 +252,7 @@ def office() -> FloorPlan:
 def hall() -> FloorPlan:
     """One room of 6 m by 5 m with a pillar and a box that is moved: small enough to check by hand."""
     pillar = standing(4.05, 3.05, 4.55, 3.55)
-    box = Box((0.4, 0.4), schedule([3.0, 5.0], [[4.65, 1.25, 0.0], [2.65, 3.85, 0.0]]))
+    box = Box((0.4, 0.4), schedule([3.0, 5.0], [[4.65, 1.25, 0.7], [2.65, 3.85, 0.7]]))
     room = np.array([[0.05, 0.05, 6.05, 5.05]])
     return FloorPlan(
         rectangle(*room[0]), room, np.array([[1.0, 1.0], [3.5, 1.0], [3.5, 2.5]]), (pillar,), (box,)

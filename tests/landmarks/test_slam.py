@@ -1,0 +1,138 @@
+"""The whole loop: pose, S, D and landmarks, from a known start."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vslam_ref.experiments.moving.localisation import localise
+from vslam_ref.experiments.moving.readings import increment_of, scan_of
+from vslam_ref.filters.vehicle import Increment
+from vslam_ref.grids import MapConfig, Scan
+from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig, LandmarkConfig
+
+from .conftest import HallRun
+
+
+def rmse(run: HallRun, poses: np.ndarray) -> float:
+    return float(np.sqrt(((poses - run.recording.poses)[:, :2] ** 2).sum(axis=1).mean()))
+
+
+def test_the_robot_knows_where_it_is(hall: HallRun) -> None:
+    """A fifth of a cell with walls in sight all the time; the odometry alone is off by half a cell."""
+    assert rmse(hall, hall.poses) < 0.02
+    blind, _, _ = localise(hall.recording, GridSlamConfig(match=False, landmarks=False))
+    assert rmse(hall, blind) > 0.05
+
+
+def test_landmarks_alone_beat_the_odometry(hall: HallRun) -> None:
+    poses, _, slam = localise(hall.recording, GridSlamConfig(match=False, map=MapConfig(d_memory="text")))
+    blind, _, _ = localise(hall.recording, GridSlamConfig(match=False, landmarks=False))
+    assert rmse(hall, poses) < 0.5 * rmse(hall, blind)
+    assert len(slam.landmarks.active) >= 4
+
+
+def test_landmarks_on_walls_lie_on_corners(hall: HallRun) -> None:
+    """Filter's places against the plan: within 5 cm, the pose's error and a corner's sigma together."""
+    corners = hall.recording.segments[-1].reshape(-1, 2)
+    off = np.hypot(*(hall.slam.places()[:, None] - corners).transpose(2, 0, 1)).min(axis=1)
+    assert len(off) >= 4
+    assert off.max() < 0.05
+
+
+def test_a_landmark_on_the_box_is_found_out(hall: HallRun) -> None:
+    """The box stands until 3 s and is carried away before the robot's eyes: its landmarks go."""
+    box = hall.recording.plan.things[0].corners(0.0)
+    on_box = []
+    b = hall.slam.filter.blocks
+    for mark in hall.slam.landmarks.landmarks:
+        column = int(b.columns(np.array([mark.id]))[0])
+        place = b.x_m[0, column : column + 2]
+        if np.hypot(*(box - place).T).min() < 0.1 and mark.born < 15:
+            on_box.append(mark)
+    assert on_box, "while it stood the box was as static as a wall"
+    assert all(m.withdrawn is not None for m in on_box)
+    assert all(m.withdrawn < 15 + 25 for m in on_box if m.withdrawn is not None), "within five seconds"
+
+
+def test_without_withdrawal_it_stays(hall: HallRun) -> None:
+    config = GridSlamConfig(choice=LandmarkConfig(withdraw=False), map=MapConfig(d_memory="text"))
+    _, _, slam = localise(hall.recording, config)
+    assert all(m.withdrawn is None for m in slam.landmarks.landmarks)
+    assert len(slam.landmarks.active) > len(hall.slam.landmarks.active)
+
+
+def test_no_two_look_alikes_stand_near_each_other(hall: HallRun) -> None:
+    places, active = hall.slam.places(), hall.slam.landmarks.active
+    for i, a in enumerate(active):
+        for j, b in enumerate(active[:i]):
+            if a.convex == b.convex and abs(np.angle(np.exp(1j * (a.bisector - b.bisector)))) < 0.4:
+                assert np.hypot(*(places[i] - places[j])) > 0.5
+
+
+def test_the_same_input_gives_the_same_bytes(hall: HallRun) -> None:
+    again, _, _ = localise(hall.recording, hall.slam.config)
+    np.testing.assert_array_equal(again, hall.poses)
+
+
+def test_a_plain_grid_can_take_the_place_of_s(hall: HallRun) -> None:
+    poses, _, slam = localise(hall.recording, GridSlamConfig(separate=False))
+    assert rmse(hall, poses) < 0.03
+    assert slam.static().log_odds.shape == slam.maps.lattice.shape
+
+
+def bad_steps() -> list[tuple[Increment | None, Scan, str]]:
+    beams, ranges = np.linspace(-1, 1, 50), np.full(50, 2.0)
+    good = Scan(beams, ranges, 10.0, 1.0)
+    one = np.ones(1)
+    return [
+        (None, Scan(beams, ranges[1:], 10.0, 1.0), "one range per beam"),
+        (None, Scan(np.full(50, np.nan), ranges, 10.0, 1.0), "finite"),
+        (None, Scan(beams, ranges, 0.0, 1.0), "max_range"),
+        (None, Scan(beams, ranges, 10.0, np.nan), "time"),
+        (Increment(np.ones(2), one, np.eye(2)[None]), good, "batch of one run"),
+        (Increment(np.array([np.nan]), one, np.eye(2)[None]), good, "finite"),
+    ]
+
+
+@pytest.mark.parametrize(("increment", "scan", "words"), bad_steps())
+def test_bad_input_is_refused_and_changes_nothing(
+    increment: Increment | None, scan: Scan, words: str
+) -> None:
+    slam = GridSlam([0.0, 0.0, 0.0])
+    beams = np.linspace(-1, 1, 50)
+    slam.step(None, Scan(beams, np.full(50, 3.0), 10.0, 0.0))
+    pose, layers = slam.pose, {k: v.copy() for k, v in slam.maps.layers.items()}
+    cov = slam.filter.blocks.P_pp.copy()
+    with pytest.raises(ValueError, match=words):
+        slam.step(increment, scan)
+    np.testing.assert_array_equal(slam.pose, pose)
+    np.testing.assert_array_equal(slam.filter.blocks.P_pp, cov)
+    for name, layer in layers.items():
+        np.testing.assert_array_equal(slam.maps.layers[name], layer)
+    assert slam.scans == 1
+
+
+def test_scans_without_a_reading_only_drift() -> None:
+    slam = GridSlam([1.0, 2.0, 0.5])
+    empty = Scan(np.linspace(-1, 1, 50), np.full(50, np.nan), 10.0, 0.0)
+    slam.step(None, empty)
+    step = slam.step(
+        Increment(np.array([0.1]), np.array([0.0]), 1e-4 * np.eye(2)[None]), empty._replace(time=0.2)
+    )
+    np.testing.assert_allclose(step.pose, [1.0 + 0.1 * np.cos(0.5), 2.0 + 0.1 * np.sin(0.5), 0.5])
+    assert step.match is not None
+    assert step.match.reason == "too few points on the map"
+
+
+@pytest.mark.parametrize("start", [[0.0, 0.0], [0.0, np.inf, 0.0]])
+def test_starts_that_mean_nothing_are_refused(start: list[float]) -> None:
+    with pytest.raises(ValueError, match="start"):
+        GridSlam(start)
+    with pytest.raises(ValueError, match="sigmas"):
+        GridSlam([0.0, 0.0, 0.0], start_sigma=(0.0, 1.0))
+
+
+def test_the_first_increment_is_none(hall: HallRun) -> None:
+    assert increment_of(hall.recording, 0) is None
+    assert scan_of(hall.recording, 3).time == pytest.approx(0.6)

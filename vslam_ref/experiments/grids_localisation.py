@@ -1,0 +1,188 @@
+"""Position error with and without the separation as the crowd grows, and what a wrong position does to D."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
+from vslam_ref.experiments.moving.localisation import (
+    SPOILED,
+    LocalisationConfig,
+    Run,
+    Task,
+    f_score,
+    simulate_run,
+)
+from vslam_ref.experiments.moving.readings import interval_of_means, interval_of_ratio
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+HALF = 0.5
+"""Aim: RMSE with separation over RMSE with a plain grid in the densest crowd."""
+FALLS = 0.05
+"""Fall of D's F score that counts as spoiled."""
+GROWS = 2.0
+"""Growth of the position error that counts as spoiled."""
+
+
+class Study(NamedTuple):
+    """All runs: arrays with densities, then runs first; ``spoiled`` with runs first."""
+
+    config: LocalisationConfig
+    rmse: Array
+    final: Array
+    beams: Array
+    spoiled: Array
+    on_people: Array
+
+
+def run(config: LocalisationConfig, context: RunContext) -> Result:
+    """Run all densities, and the wrong poses at ``error_density``."""
+    seeds = np.random.SeedSequence(config.seed).spawn(config.runs)
+    tasks = [Task(config, density, seed, False) for density in config.densities for seed in seeds]
+    tasks = [t._replace(spoil=t.density == config.error_density) for t in tasks]
+    if config.error_density not in config.densities:
+        tasks += [Task(config, config.error_density, seed, True) for seed in seeds]
+    done = context.map(simulate_run, tasks, "crowds")
+    shape, first = (len(config.densities), config.runs), len(config.densities) * config.runs
+    stacked = {n: np.array([getattr(r, n) for r in done]) for n in Run._fields}
+    spoiled = stacked.pop("spoiled")[np.array([t.spoil for t in tasks])]
+    stacked = {n: a[:first].reshape(*shape, *a.shape[1:]) for n, a in stacked.items()}
+    study = Study(config, spoiled=spoiled, **stacked)
+    return Result(
+        series={
+            "density": config.densities,
+            "rmse": study.rmse.mean(axis=1),
+            "final": study.final.mean(axis=1),
+            "f_score": f_score(study.beams).mean(axis=1),
+            "on_people": study.on_people.mean(axis=1),
+            "error": config.errors,
+            "f_score_spoiled": f_score(spoiled).mean(axis=0),
+        },
+        seed=config.seed,
+        runs=config.runs,
+        arrays={**stacked, "spoiled": spoiled},
+        payload=study,
+    )
+
+
+def claims(result: Result) -> list[Claim]:
+    """Judge the separation, and A's sentence with its converse."""
+    study: Study = result.payload
+    return [_half(study), _helps(study), _spoils_dynamic(study), _spoils_static(study)]
+
+
+def _half(study: Study) -> Claim:
+    """The aim: half the error in the densest crowd."""
+    separated, plain = study.rmse[-1].T
+    ratio = float(separated.mean() / plain.mean())
+    rng = np.random.default_rng([study.config.seed, 1])
+    return Claim(
+        "halves-the-error",
+        "A§4.4",
+        "In the densest crowd the separation halves the position error",
+        f"mean RMSE with separation / with a plain grid <= {HALF:g} (ci: of this ratio, over whole runs)",
+        {"ratio": ratio, "separated": float(separated.mean()), "plain": float(plain.mean())},
+        interval_of_ratio(separated, plain, rng),
+        None,
+        float(np.mean(separated <= HALF * plain)),
+        verdict(ratio <= HALF),
+    )
+
+
+def _helps(study: Study) -> Claim:
+    """The weaker sentence: it helps at all, over all crowds."""
+    crowded = study.rmse[1:]
+    log_ratio = np.log(crowded[..., 0] / crowded[..., 1]).mean(axis=0)
+    rng = np.random.default_rng([study.config.seed, 2])
+    interval = [float(np.exp(v)) for v in interval_of_means(log_ratio, rng)]
+    return Claim(
+        "helps",
+        "A§4.4",
+        "With people on the floor the separation makes the position error smaller",
+        "geometric mean over crowds of RMSE separated / plain, per run: 95 % whole-run interval < 1",
+        {"ratio": float(np.exp(log_ratio.mean()))},
+        interval,
+        0.025,
+        float(np.mean(log_ratio < 0)),
+        verdict(interval[1] < 1.0),
+    )
+
+
+def _spoils_dynamic(study: Study) -> Claim:
+    """A's sentence: errors of the static positions make errors of the dynamic estimate."""
+    errors = study.config.errors
+    f = f_score(study.spoiled)
+    fall = f[:, errors.index(0.0)] - f[:, errors.index(SPOILED)]
+    rng = np.random.default_rng([study.config.seed, 3])
+    interval = interval_of_means(fall, rng)
+    return Claim(
+        "static-error-spoils-dynamic",
+        "A§4.4",
+        "Errors of the static positions lead to errors in the estimate of what moves",
+        f"fall of D's F score per beam, poses wrong by {SPOILED:g} m against true: "
+        f"95 % whole-run interval > {FALLS:g}",
+        {"true": float(f[:, errors.index(0.0)].mean()), "spoiled": float(f[:, errors.index(SPOILED)].mean())},
+        interval,
+        0.025,
+        float(np.mean(fall > FALLS)),
+        verdict(interval[0] > FALLS),
+    )
+
+
+def _spoils_static(study: Study) -> Claim:
+    """The converse: what moves spoils the static estimate, here the position in a plain grid."""
+    empty, dense = study.rmse[0, :, 1], study.rmse[-1, :, 1]
+    rng = np.random.default_rng([study.config.seed, 4])
+    interval = interval_of_ratio(dense, empty, rng)
+    return Claim(
+        "moving-things-spoil-static",
+        "A§4.4",
+        "The converse: moving things that nobody separates lead to errors of the static positions",
+        f"RMSE with a plain grid, densest crowd / empty floor: 95 % whole-run interval > {GROWS:g}",
+        {"empty": float(empty.mean()), "dense": float(dense.mean())},
+        interval,
+        0.025,
+        float(np.mean(dense > GROWS * empty)),
+        verdict(interval[0] > GROWS),
+    )
+
+
+def figure(result: Result) -> Figure:
+    """Position error over the crowd's density, and D over the error of the poses."""
+    from vslam_ref.plot.floor_plan import localisation_figure
+
+    study: Study = result.payload
+    return localisation_figure(
+        np.asarray(study.config.densities),
+        study.rmse,
+        np.asarray(study.config.errors),
+        f_score(study.spoiled),
+    )
+
+
+def quick(config: LocalisationConfig) -> LocalisationConfig:
+    """Two runs of 10 s, an empty floor and one crowd."""
+    world = dataclasses.replace(config.world, duration=10.0)
+    return dataclasses.replace(
+        config, runs=2, densities=(0.0, 0.2), errors=(0.0, SPOILED), error_density=0.2, world=world
+    )
+
+
+EXPERIMENT = Experiment(
+    id="grids-localisation",
+    title="Localisation with and without the separation, as the crowd grows",
+    source="A, section 4.4",
+    config_type=LocalisationConfig,
+    run=run,
+    claims=claims,
+    figure=figure,
+    quick=quick,
+)

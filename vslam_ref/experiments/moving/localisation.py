@@ -1,0 +1,177 @@
+"""Pose and maps together, with and without the separation: one run.
+
+The dynamic map is judged *beam by beam*: does D, at the place where the beam ends by the robot's own
+estimate, say that something moves, and did the beam end on something that moves?  This needs no common
+frame, so that it stays fair when the pose is off.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
+from vslam_ref.geometry import se2
+from vslam_ref.grids import MapConfig, StaticDynamicMap
+from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig
+from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
+from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording, simulate, turned
+
+Array = NDArray[np.float64]
+
+MODES = ("separated", "plain")
+SPOILED = 0.1
+"""Metres: the error of the poses at which the dynamic map is judged."""
+
+
+@dataclass(frozen=True)
+class LocalisationConfig:
+    """The runs."""
+
+    runs: int = field(
+        default=6, metadata={"reason": "errors differ by a factor between runs: intervals are given"}
+    )
+    seed: int = field(default=20, metadata={"reason": "any; fixed for repeatability"})
+    densities: tuple[float, ...] = field(
+        default=(0.0, 0.1, 0.2, 0.3, 0.4),
+        metadata={"reason": "0 to 40 % of the free floor; the densest is judged"},
+    )
+    errors: tuple[float, ...] = field(
+        default=(0.0, 0.02, 0.05, 0.1, 0.2),
+        metadata={"reason": "of the poses from which maps are drawn; 0.1 is judged: a cell", "unit": "m"},
+    )
+    error_density: float = field(default=0.1, metadata={"reason": "people enough, and walls in sight"})
+    lever: float = field(
+        default=5.0, metadata={"reason": "an error of 0.1 m turns by 0.1/5: alike on walls 5 m off"}
+    )
+    turn: float = field(
+        default=0.3, metadata={"reason": "rasters in step with walls would place them exactly", "unit": "rad"}
+    )
+    world: FloorPlanConfig = field(
+        default_factory=lambda: FloorPlanConfig(laser=LaserConfig(beams=541)),
+        metadata={"reason": "an office; half a degree, as indoor scanners have"},
+    )
+    slam: GridSlamConfig = field(
+        default_factory=lambda: GridSlamConfig(landmarks=False, map=MapConfig(d_memory="text")),
+        metadata={
+            "reason": "scan matching alone: the map is the one difference; landmarks have their own study"
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse studies that mean nothing."""
+        if self.runs < 2 or len(self.densities) < 2 or list(self.densities) != sorted(set(self.densities)):
+            raise ValueError(
+                f"runs={self.runs}, densities={self.densities}: need 2 runs and 2 densities, in order"
+            )
+        if self.densities[0] != 0.0 or 0.0 not in self.errors or SPOILED not in self.errors:
+            raise ValueError(f"densities must begin with 0, errors={self.errors} hold 0 and {SPOILED}")
+        if self.lever <= 0:
+            raise ValueError(f"lever={self.lever}: need a length > 0")
+
+
+class Task(NamedTuple):
+    """One run at one density; ``spoil``: draw maps from wrong poses too."""
+
+    config: LocalisationConfig
+    density: float
+    seed: np.random.SeedSequence
+    spoil: bool
+
+
+class Run(NamedTuple):
+    """What one run gave.
+
+    Attributes
+    ----------
+    rmse, final : ndarray, shape (2,)
+        Position error over the run (root mean square) and at its end, metres, for both modes.
+    beams : ndarray, shape (3,)
+        Of the separated mode: beams rightly called moving, called moving, on moving things.
+    spoiled : ndarray, shape (errors, 3)
+        The same counts for maps drawn from true poses plus errors; zero where not asked for.
+    on_people : float
+        Share of beams that end on a person.
+    """
+
+    rmse: Array
+    final: Array
+    beams: Array
+    spoiled: Array
+    on_people: float
+
+
+def beam_counts(recording: Recording, k: int, pose: Array, maps: StaticDynamicMap) -> Array:
+    """Beams of scan k rightly called moving, called moving, on moving things."""
+    r, owner = recording.ranges[k], recording.owner[k]
+    used = np.isfinite(r) & (r > 0) & (r < recording.config.laser.max_range) & (owner >= 0)
+    angles = recording.angles[used]
+    ends = se2.act(pose, r[used, None] * np.stack([np.cos(angles), np.sin(angles)], 1))
+    says = maps.dynamic().at(ends) > DECIDED_LOG_ODDS
+    moves = recording.moving[k, owner[used]]
+    return np.array([(says & moves).sum(), says.sum(), moves.sum()], dtype=np.float64)
+
+
+def f_score(counts: Array) -> Array:
+    """Harmonic mean (...,) of precision and recall, 2 right / (said + there), from counts (..., 3)."""
+    right, said, there = np.moveaxis(np.asarray(counts, dtype=np.float64), -1, 0)
+    both = said + there
+    score: Array = np.where(both > 0, 2 * right / np.maximum(both, 1.0), 1.0)
+    return score
+
+
+def localise(
+    recording: Recording, config: GridSlamConfig, warm_up: int = 25
+) -> tuple[Array, Array, GridSlam]:
+    """Estimated poses (n, 3), beam counts (3,) of D after ``warm_up`` scans (0 for a plain grid), loop."""
+    slam = GridSlam(recording.poses[0], config)
+    poses, beams = np.empty_like(recording.poses), np.zeros(3)
+    for k in range(len(recording)):
+        poses[k] = slam.step(increment_of(recording, k), scan_of(recording, k)).pose
+        if isinstance(slam.maps, StaticDynamicMap) and k >= warm_up:
+            beams += beam_counts(recording, k, poses[k], slam.maps)
+    return poses, beams, slam
+
+
+def spoiled_counts(
+    recording: Recording,
+    config: MapConfig,
+    sigma: float,
+    lever: float,
+    rng: np.random.Generator,
+    warm_up: int = 25,
+) -> Array:
+    """Beam counts (3,) of maps drawn from the true poses plus independent errors of ``sigma`` metres."""
+    maps, total = StaticDynamicMap(config), np.zeros(3)
+    errors = sigma * rng.standard_normal((len(recording), 3)) / [1.0, 1.0, lever]
+    for k in range(len(recording)):
+        pose = recording.poses[k] + errors[k]
+        maps.update(pose, scan_of(recording, k))
+        if k >= warm_up:
+            total += beam_counts(recording, k, pose, maps)
+    return total
+
+
+def simulate_run(task: Task) -> Run:
+    """One run at one density, both modes on the same recording."""
+    config = task.config
+    crowd = dataclasses.replace(config.world.crowd, density=task.density)
+    rng = generator(task.seed)
+    recording = turned(simulate(dataclasses.replace(config.world, crowd=crowd), rng), config.turn)
+    rmse, final, beams = np.empty(2), np.empty(2), np.zeros(3)
+    for i, mode in enumerate(MODES):
+        poses, counted, _ = localise(
+            recording, dataclasses.replace(config.slam, separate=mode == "separated")
+        )
+        off = np.hypot(*(poses - recording.poses)[:, :2].T)
+        rmse[i], final[i] = np.sqrt(np.mean(off**2)), off[-1]
+        beams += counted
+    spoiled = np.zeros((len(config.errors), 3))
+    if task.spoil:
+        for i, sigma in enumerate(config.errors):
+            spoiled[i] = spoiled_counts(recording, config.slam.map, sigma, config.lever, rng)
+    return Run(rmse, final, beams, spoiled, recording.share_on_people)
