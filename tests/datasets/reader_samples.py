@@ -229,6 +229,14 @@ CARMEN = "# a comment\nPARAM laser_front_laser_resolution 1.0\n" + "".join(
     f"ODOM {k} 0 0 0 0 0 0 nohost 0\n"
     for k in range(4)
 )
+ROS_MAP = """image: map.pgm
+mode: trinary
+resolution: 0.05
+origin: [-1.0, 2.5, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
 MRCLAM = {
     "Barcodes.dat": "# subject barcode\n1 5\n2 14\n6 63\n7 81\n8 7\n",
     "Robot1_Odometry.dat": "# t v w\n100.0 0.1 0.0\n100.5 0.1 0.2\n101.0 0.1 0.2\n101.5 0.0 0.0\n",
@@ -323,6 +331,12 @@ SAMPLES: dict[str, list[Sample]] = {
     "calibration_files.tum_mono:read_tum_mono": [Sample(_one("camera.txt", TUM_MONO), check=camera_wrong)],
     "carmen:read": [Sample(_one("corrected.log", CARMEN))],
     "checkerboard:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
+    "grid_files:read_ros_map": [
+        Sample(
+            {"map.yaml": ROS_MAP.encode(), "map.pgm": cv2.imencode(".pgm", _GREY)[1].tobytes()},
+            lambda folder: (folder / "map.yaml",),
+        )
+    ],
     "matching:read_grey": [Sample(_picture(".png"), binary=True)],
     "matfile:read_vectors": [
         Sample(

@@ -17,13 +17,13 @@ decided cell decided and every other undecided.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.datasets.picture_size import require_size
 from vslam_ref.datasets.text import Array, FormatError
 from vslam_ref.grids.lattice import MAX_CELLS, Lattice
 from vslam_ref.grids.log_odds import DECIDED, LogOddsGrid, log_odds
@@ -112,7 +112,7 @@ def _yaml(path: Path) -> dict[str, Any]:
         raise FormatError(path, None, f"more than {MAX_YAML} bytes; is this a map's YAML?")
     try:
         about = yaml.safe_load(data.decode("utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # an impossible date is a ValueError
         mark = getattr(error, "problem_mark", None)
         raise FormatError(path, mark.line + 1 if mark else None, "not YAML; expected a map's file") from None
     if not isinstance(about, dict):
@@ -121,7 +121,8 @@ def _yaml(path: Path) -> dict[str, Any]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether it is a number of a size that a map may have; NaN is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -1e15 < value < 1e15
 
 
 def _number(path: Path, about: dict[str, Any], key: str) -> float:
@@ -134,9 +135,17 @@ def _number(path: Path, about: dict[str, Any], key: str) -> float:
 def _picture(path: Path, name: Any) -> Array:
     import cv2
 
-    if not isinstance(name, str) or not (path.parent / name).is_file():
+    try:
+        there = isinstance(name, str) and (path.parent / name).is_file()
+    except OSError:  # a name that no file can have
+        there = False
+    if not there:
         raise FormatError(path, None, f"image is {name!r}; expected a picture beside the YAML")
-    picture = cv2.imdecode(np.fromfile(path.parent / name, np.uint8), cv2.IMREAD_GRAYSCALE)
+    require_size(path.parent / name, MAX_CELLS)
+    try:
+        picture = cv2.imdecode(np.fromfile(path.parent / name, np.uint8), cv2.IMREAD_GRAYSCALE)
+    except cv2.error:  # empty, or too large for OpenCV
+        picture = None
     if picture is None:
         raise FormatError(path.parent / name, None, "not a picture; expected PNG or PGM")
     if picture.size > MAX_CELLS:
