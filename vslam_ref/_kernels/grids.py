@@ -152,7 +152,9 @@ def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, 
             state = _state(old)
             is_hit = 1 if look >= HIT else 0
             if is_hit:
-                since[at] = now if last_hit[at] == -np.inf else since[at]
+                unseen = now - seen[at]
+                shifted = since[at] + (unseen if unseen > gap else 0.0)
+                since[at] = now if last_hit[at] == -np.inf else shifted
                 last_hit[at] = now
             elif now - last_hit[at] > gap:
                 last_hit[at] = -np.inf

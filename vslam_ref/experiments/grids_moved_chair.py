@@ -268,7 +268,7 @@ def _leaves(study: Study) -> Claim:
         "leaves-its-old-place",
         "S lets go of the place from which the chair was taken, under both",
         f"in every run and both variants: share still static < 0.05 from {SLACK + 1:g} s after it was lifted",
-        (old < 0.05).all(axis=0),
+        np.array((old < 0.05).all(axis=0), dtype=np.bool_),
         {v: float(o.mean()) for v, o in zip(VARIANTS, old, strict=True)},
         "A§4.2",
     )
@@ -281,7 +281,7 @@ def _walkers(study: Study) -> Claim:
         "ageing-takes-in-no-walkers",
         "Ageing puts no more moving things into S than the table does",
         "in every run: share of S that nothing static covers is at most 0.02 larger than without ageing",
-        np.asarray(ageing - printed <= 0.02),
+        np.array(ageing - printed <= 0.02, ndmin=1),
         {"printed": float(printed.mean()), "ageing": float(ageing.mean())},
         "ageing variant",
     )

@@ -199,7 +199,7 @@ def _late(study: Study) -> Claim:
     gain, interval = _gain(study, recall, _column("text", "free"), _column("formula", "free"), 5)
     return Claim(
         "memory-is-late",
-        "A4.3, errata",
+        "A§4.3, errata",
         "With D_{t-1} a cell that was seen free is decided at its second hit, and a walker has left by then",
         "recall of text minus recall of formula, same runs: 95 % whole-run interval > 0.1",
         {"text": float(recall[:, 0].mean()), "formula": float(recall[:, 1].mean())},
@@ -215,7 +215,7 @@ def _same_s(study: Study) -> Claim:
     spread = np.ptp(study.static, axis=1).max()
     return Claim(
         "s-is-the-same",
-        "A4.2",
+        "A§4.2",
         "All four readings draw the same static map",
         "counts of S are equal, in every run",
         {"largest_difference": float(spread)},

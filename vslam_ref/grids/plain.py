@@ -2,7 +2,7 @@
 
     L_t = L(occupied | o_t) + L_{t-1}
 
-This is A4.2 with a table that does not look at the past.  Evidence and bound are those of S, so that the
+This is A§4.2 with a table that does not look at the past.  Evidence and bound are those of S, so that the
 two maps differ in one thing only.
 """
 

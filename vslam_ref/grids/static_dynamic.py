@@ -3,8 +3,8 @@
 Each scan changes both, by A's chapter 4: the table of :mod:`inverse_sensor` is looked up with what S said of
 a cell *before* the scan, and its log-odds are added.
 
-    L(S_t) = L(S | o_t, S_{t-1}) + L(S_{t-1})                                                    (A4.2)
-    L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                        (A4.3)
+    L(S_t) = L(S | o_t, S_{t-1}) + L(S_{t-1})                                                   (A§4.2)
+    L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                       (A§4.3)
     L(D_t) = L(D | o_t, S_{t-1})                     d_memory = "text"
 
 Three rules are added, each with a switch:
@@ -14,10 +14,10 @@ Three rules are added, each with a switch:
 * *explained hits*: a hit within ``explained_by`` cells of a decided static cell is taken for that cell's, in
   both tables: noise of the range and of the pose makes walls no movers, and a wall that lost a cell gets
   it back.  0 is the table as it stands: a cell of a wall that was free once is lost for ever.
-* *settling* (the ageing variant): what was hit on free floor again and again for ``settle_seconds``, and
-  never missed later than ``hit_gap`` seconds after a hit, has come to stay.  S forgets there that the floor was
-  free, and takes it in.  ``None`` is the table as it stands: a chair put down on once-free floor is dynamic
-  for ever.
+* *settling* (the ageing variant): what was hit on free floor for ``settle_seconds``, and never missed later
+  than ``hit_gap`` seconds after a hit, has come to stay.  Longer times without a look do not count.  S
+  forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put down on
+  once-free floor is dynamic for ever.
 
 :data:`AS_PRINTED` has none of the last two.
 """
@@ -57,7 +57,7 @@ class MapConfig:
     )
     sensor: InverseSensor = field(default_factory=InverseSensor, metadata={"reason": "see there"})
     d_memory: Memory = field(
-        default="text", metadata={"reason": "with A4.3's memory a walker has left before D believes it"}
+        default="text", metadata={"reason": "with A§4.3's memory a walker has left before D believes it"}
     )
     d_high_where: Where = field(
         default="free", metadata={"reason": "what moves shows itself where S was free; 'unknown' is A's text"}
@@ -106,6 +106,8 @@ AS_PRINTED = MapConfig(explained_by=0, settle_seconds=None)
 
 class StaticDynamicMap(Canvas):
     """S and D, from one scan to the next.
+
+    Implements A§4.1: of every cell, the probability that something static or something moving is there.
 
     Parameters
     ----------
@@ -205,14 +207,15 @@ def apply_scan(
 ) -> None:
     """Change S and D, in place, by one scan.
 
-    Implements :eq:`eq-a4-2` and :eq:`eq-a4-3` in log-odds.
+    Implements :eq:`eq-static-recursion` (A§4.2) and :eq:`eq-dynamic-recursion` (A§4.3) in log-odds.
 
     Parameters
     ----------
     s, d : ndarray, shape (rows * columns,)
         Log-odds, row by row.
     seen, last_hit, since : ndarray, shape (rows * columns,)
-        Times: of the last look, of the last hit of the present visit (-inf: none), and of its first hit.
+        Times: of the last look, of the last hit of the present visit (-inf: none), and of its first hit,
+        shifted by the time at which nobody looked.
     columns : int
         Cells in a row.
     start : ndarray, shape (2,)
@@ -237,7 +240,9 @@ def apply_scan(
 
     # S_{t-1} in the cells that were hit
     s_hit = s[hits]
-    began = np.where(last_hit[hits] == -np.inf, now, since[hits])
+    unseen = now - seen[hits]
+    unseen[unseen <= gap] = 0.0  # time at which nobody looked does not count
+    began = np.where(last_hit[hits] == -np.inf, now, since[hits] + unseen)
     settled = (states(s_hit) == FREE) & (now - began >= settle)
     s_hit[settled] = 0.0
     state = np.where(explained, OCCUPIED, states(s_hit))

@@ -122,9 +122,57 @@ def chair_figure(
             axes.plot(since, 100 * dynamic[v], color=style.VERMILION, lw=2, ls="--", label="in D")
             if name == "ageing":
                 axes.axvline(settle, color=style.GREY, lw=1, ls=(0, (2, 2)))
-                axes.annotate("T", (settle, 50), xytext=(4, 0), textcoords="offset points", color=style.GREY)
+                axes.annotate(
+                    "T", (settle, 62), xytext=(-12, 0), textcoords="offset points", color=style.GREY
+                )
             axes.set(title=f"{name} table", xlabel="time since it was put down [s]", xlim=(0, since[-1]))
         panels[0].set_ylabel("share of its cells [%]")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def beams_figure(start: Array, ends: Array, cells: Sequence[Array], titles: Sequence[str]) -> Figure:
+    """Draw beams over the cells that they cross, one panel a beam.
+
+    Parameters
+    ----------
+    start : ndarray, shape (2,)
+    ends : ndarray, shape (b, 2)
+        (x, y) in cells.
+    cells : sequence of ndarray, shape (n, 2)
+        (row, column) that each beam crosses.
+    titles : sequence of str
+    """
+    with style.house_style():
+        figure, panels = style.new_figure(3.6, len(ends))
+        for axes, end, crossed, title in zip(panels, ends, cells, titles, strict=True):
+            low = np.minimum(crossed.min(axis=0), 0) - 1
+            high = crossed.max(axis=0) + 2
+            picture = np.ones((high[0] - low[0], high[1] - low[1]))
+            picture[tuple((crossed - low).T)] = 0.75
+            extent = (low[1], high[1], low[0], high[0])
+            axes.imshow(picture, cmap="gray", vmin=0, vmax=1, origin="lower", extent=extent)
+            axes.set_xticks(np.arange(low[1], high[1] + 1))
+            axes.set_yticks(np.arange(low[0], high[0] + 1))
+            axes.plot([start[0], end[0]], [start[1], end[1]], color=style.BLUE, lw=2)
+            axes.plot(*end, "o", color=style.VERMILION, ms=7)
+            axes.set(title=title, xlabel="x [cells]", ylabel="y [cells]", aspect="equal")
+    return figure
+
+
+def cell_figure(series: Sequence[tuple[str, Array]], truth: Array, decided: float) -> Figure:
+    """Draw log-odds of one cell after each observation, for readings of a recursion, beside the truth."""
+    colours = (style.VERMILION, style.GREEN, style.BLUE, style.PURPLE, style.ORANGE, style.SKY)
+    lines = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (1, 1)))
+    with style.house_style():
+        figure, (axes,) = style.new_figure(4.0)
+        n = np.arange(1, len(truth) + 1)
+        axes.plot(n, truth, color=style.BLACK, lw=5, alpha=0.25, label="Bayes, directly")
+        for (name, values), colour, line in zip(series, colours, lines, strict=False):
+            axes.plot(n, values, color=colour, ls=line, lw=2, label=name)
+        for level in (-decided, decided):
+            axes.axhline(level, color=style.GREY, lw=1, ls=(0, (2, 2)))
+        axes.set(xlabel="observations", ylabel="log-odds", ylim=(-8, 8), xlim=(1, len(truth)))
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
