@@ -12,7 +12,7 @@ import pytest
 
 from vslam_ref import cli
 from vslam_ref.commands import calibrate as command
-from vslam_ref.datasets import checkerboard
+from vslam_ref.datasets import checkerboard, pictures
 from vslam_ref.datasets.calibration_files import read_opencv
 from vslam_ref.estimation.calibration import Board, calibrate, simulated
 from vslam_ref.estimation.robust import LOSSES
@@ -70,7 +70,7 @@ def test_printed_written_and_computed_numbers_are_the_same(
     assert numbers["skipped"] == [str(folder / "wall.png")]
     assert "wall.png: no board found, left out" in shown
     views = [
-        (BOARD.points, checkerboard.find_corners(checkerboard.read_grey(folder / f"{i}.png"), 6, 4))
+        (BOARD.points, checkerboard.find_corners(pictures.read_grey(folder / f"{i}.png"), 6, 4))
         for i in range(8)
     ]
     found = calibrate(views, SIZE)

@@ -330,14 +330,13 @@ SAMPLES: dict[str, list[Sample]] = {
     ],
     "calibration_files.tum_mono:read_tum_mono": [Sample(_one("camera.txt", TUM_MONO), check=camera_wrong)],
     "carmen:read": [Sample(_one("corrected.log", CARMEN))],
-    "checkerboard:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
+    "pictures:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
     "grid_files:read_ros_map": [
         Sample(
             {"map.yaml": ROS_MAP.encode(), "map.pgm": cv2.imencode(".pgm", _GREY)[1].tobytes()},
             lambda folder: (folder / "map.yaml",),
         )
     ],
-    "matching:read_grey": [Sample(_picture(".png"), binary=True)],
     "matfile:read_vectors": [
         Sample(
             {"a.mat": _matlab(a=np.arange(5.0), b=np.arange(5, dtype=np.int32))},

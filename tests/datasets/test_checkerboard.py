@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import catalogue
-from vslam_ref.datasets.checkerboard import find_corners, image_files, read_grey
+from vslam_ref.datasets.checkerboard import find_corners
+from vslam_ref.datasets.pictures import image_files, read_grey
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.estimation.calibration import Board, apply_homography, calibrate, homography
 
@@ -143,9 +144,9 @@ def test_damaged_bytes_end_in_an_image_or_in_one_line(
 
 
 def test_a_huge_picture_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from vslam_ref.datasets import checkerboard
+    from vslam_ref.datasets import pictures
 
-    monkeypatch.setattr(checkerboard, "MAX_PIXELS", 1000)
+    monkeypatch.setattr(pictures, "MAX_PIXELS", 1000)
     cv2.imwrite(str(tmp_path / "a.png"), drawn())
     with pytest.raises(FormatError, match="520x400 pixels; at most 1000"):
         read_grey(tmp_path / "a.png")

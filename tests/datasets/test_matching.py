@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from vslam_ref.datasets import matching
 from vslam_ref.datasets.matching import Features
-from vslam_ref.datasets.text import FormatError
 
 
 def picture_of_blobs(centres: np.ndarray, sigma: float = 3.0) -> np.ndarray:
@@ -94,11 +91,3 @@ def test_pictures_without_places() -> None:
         matching.detect(np.zeros((60, 80, 3), np.uint8))
     with pytest.raises(ValueError, match="float64"):
         matching.detect(np.zeros((60, 80)))
-
-
-def test_files_that_are_no_pictures(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match="no such file"):
-        matching.read_grey(tmp_path / "none.png")
-    (tmp_path / "bad.png").write_bytes(b"not a picture")
-    with pytest.raises(FormatError, match="not a picture that OpenCV can read"):
-        matching.read_grey(tmp_path / "bad.png")

@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the corners, calibrate, print the numbers and write what was asked for."""
-    from vslam_ref.datasets.checkerboard import image_files
+    from vslam_ref.datasets.pictures import image_files
     from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly
     from vslam_ref.experiments.framework import files
 
@@ -117,7 +117,8 @@ def _find(paths: list[Path], board: Board) -> Found:
     """Look for the board in all images."""
     from tqdm import tqdm
 
-    from vslam_ref.datasets.checkerboard import find_corners, read_grey
+    from vslam_ref.datasets.checkerboard import find_corners
+    from vslam_ref.datasets.pictures import read_grey
     from vslam_ref.datasets.text import FormatError
 
     used: list[Path] = []

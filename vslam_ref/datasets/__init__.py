@@ -1,8 +1,17 @@
 """Floor 5: foreign formats and image sources.  One convention inside, conversion at this door.
 
-``known`` is the table of data sets, ``catalogue`` finds them on disk.  ``text`` and ``matfile`` read
-numbers and say where a file is wrong; ``mrclam`` and ``victoria_park`` make logs of them; ``noise`` holds
-what was identified from those logs.  ``bundle_files`` reads and writes bundle adjustment problems,
-``calibration_files`` cameras, ``trajectories`` poses over time.  ``middlebury`` reads pictures with exact cameras, and ``matching`` finds
-the same points in several pictures.
+==========================================  ============================================================
+module                                      holds
+==========================================  ============================================================
+``known``, ``catalogue``                    the table of data sets, and where they are on disk
+``text``, ``numbers``, ``matfile``          numbers in files, and where a file is wrong
+``mrclam``, ``victoria_park``, ``carmen``   logs of robots; ``noise``: what was identified from them
+``bundle_files``                            bundle adjustment problems
+``calibration_files``                       cameras
+``trajectories``                            poses over time
+``nist``                                    certified regressions
+``pictures``, ``checkerboard``              grey values, and the corners in them
+``middlebury``, ``matching``                pictures with exact cameras; the same points in several
+``grid_files``, ``video``                   occupancy maps and films
+==========================================  ============================================================
 """

@@ -1,4 +1,4 @@
-"""Images of a checkerboard: which files, and where the inner corners are.
+"""Images of a checkerboard: where the inner corners are.
 
 OpenCV finds the corners and refines them to sub-pixel; this is measurement.  Nothing else of a calibration is
 done by it.  Pixel (0, 0) is the centre of the top-left pixel, as everywhere here.
@@ -6,27 +6,13 @@ done by it.  Pixel (0, 0) is the centre of the top-left pixel, as everywhere her
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.datasets.picture_size import require_size
-from vslam_ref.datasets.text import FormatError
-
 Array = NDArray[np.float64]
-GreyImage = NDArray[np.uint8]
 
-SUFFIXES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
-MAX_PIXELS = 100_000_000
-CUT_OFF = "Premature end"
-"""What the JPEG decoder writes when it fills the rest of a picture with grey."""
 LEAST_CORNERS = 3
 """The detector takes no smaller board, in either direction."""
 SMALLEST_SIDE = 32
@@ -36,84 +22,6 @@ LARGEST_WINDOW = 11
 """Half of the refinement's window: this share of the distance of neighbours, and at most this many pixels.
 
 A window that reaches the next edge, as that of a border beside a narrow last row, pulls its corner there."""
-
-
-def image_files(names: Sequence[Path | str]) -> list[Path]:
-    """Images that are named: files as given, of folders all that end like an image, sorted by name.
-
-    Raises
-    ------
-    FormatError
-        If a name is neither file nor folder, or a folder has no image.
-    """
-    found: list[Path] = []
-    for word in names:
-        name = Path(word)
-        if not str(word):
-            raise FormatError(name, None, "an empty name; expected an image or a folder of images")
-        if name.is_dir():
-            inside = sorted(p for p in name.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file())
-            if not inside:
-                raise FormatError(name, None, f"no image in this folder; expected {', '.join(SUFFIXES)}")
-            found += inside
-        elif name.is_file():
-            found.append(name)
-        else:
-            raise FormatError(name, None, "no such file or folder")
-    return found
-
-
-def read_grey(path: Path | str) -> GreyImage:
-    """Read an image as grey values (H, W), as it is stored: a note of how to turn it (EXIF) is not followed.
-
-    A camera's parameters belong to the sensor's rows and columns, however it was held.
-
-    Raises
-    ------
-    FormatError
-        If the file is missing, no image, cut off, or larger than ``MAX_PIXELS``.
-    """
-    import cv2
-
-    path = Path(path)
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
-    require_size(path, MAX_PIXELS)
-    with _complaints() as told:
-        try:
-            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-        except cv2.error as error:  # more than 2^30 pixels
-            image = None
-            told.append(str(error.err))
-    why = " ".join(" ".join(told).split())
-    if image is None:
-        right = f"expected one of {', '.join(SUFFIXES)}"
-        raise FormatError(path, None, f"no image that can be read{f' ({why})' if why else ''}; {right}")
-    if CUT_OFF in why:
-        raise FormatError(path, None, f"{why}: the picture is cut off; fetch it again")
-    if image.size > MAX_PIXELS:
-        raise FormatError(
-            path, None, f"{image.shape[1]}x{image.shape[0]} pixels; at most {MAX_PIXELS} are read"
-        )
-    grey: GreyImage = image.astype(np.uint8, copy=False)
-    return grey
-
-
-@contextmanager
-def _complaints() -> Iterator[list[str]]:
-    """Collect what the decoders write to the process's standard error: lines that name no file."""
-    told: list[str] = []
-    sys.stderr.flush()
-    with tempfile.TemporaryFile() as sink:
-        kept = os.dup(2)
-        try:
-            os.dup2(sink.fileno(), 2)
-            yield told
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            sink.seek(0)
-            told.append(sink.read(1000).decode("utf-8", "replace"))
 
 
 def find_corners(image: NDArray[Any], columns: int, rows: int) -> Array | None:

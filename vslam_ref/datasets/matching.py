@@ -8,18 +8,15 @@ ways (cross-check).  Wrong ones remain; what uses this input must expect them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.datasets.picture_size import require_size
-from vslam_ref.datasets.text import Array, FormatError
+from vslam_ref.datasets.text import Array
 
 IntArray = NDArray[np.int64]
 
-MAX_PIXELS = 100_000_000
 RATIO = 0.75
 """Largest ratio of the distances to the best and to the second partner."""
 
@@ -40,25 +37,6 @@ class Tracks(NamedTuple):
 
     uv: Array
     mask: NDArray[np.bool_]
-
-
-def read_grey(path: Path) -> NDArray[np.uint8]:
-    """Read a picture as grey values (height, width).
-
-    Raises
-    ------
-    FormatError
-        If there is none, or it is no picture.
-    """
-    import cv2
-
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
-    require_size(path, MAX_PIXELS)
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        raise FormatError(path, None, "not a picture that OpenCV can read; expected PNG or JPEG")
-    return np.asarray(image, dtype=np.uint8)
 
 
 def detect(image: NDArray[np.uint8]) -> Features:

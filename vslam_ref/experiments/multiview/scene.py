@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.datasets import catalogue, matching, middlebury
+from vslam_ref.datasets.pictures import read_grey
 from vslam_ref.geometry import camera_pose
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.geometry.multiview import Views
@@ -101,7 +102,7 @@ def load_world(config: MultiviewConfig) -> World:
     if folder is None:
         return simulated(config, np.random.default_rng(config.seed))
     found = middlebury.read_cameras(folder / "templeSR_par.txt")
-    features = [matching.detect(matching.read_grey(picture)) for picture in found.pictures]
+    features = [matching.detect(read_grey(picture)) for picture in found.pictures]
     views = Views(found.cameras[0] if len(set(found.cameras)) == 1 else found.cameras, found.T_cam_world)
     pairs = {
         (i, j): matching.match(features[i], features[j], config.ratio)
