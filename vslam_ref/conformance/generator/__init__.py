@@ -24,6 +24,7 @@ HELPERS = (
     "world",
     "groups",
     "lenses",
+    "lens_slopes",
     "similarity",
     "views",
 )

@@ -21,7 +21,7 @@ NOTES = {
     "measured-minus-predicted": ("your residual is measured minus predicted", "u - h(C, X)"),
     "pose-inverted": ("you read the pose as T_world_cam", "h(R^T (X - t))"),
     "squared-twice": (
-        "you square e^T cov^-1 e once more: as printed in A1.4 it is called a norm, but it is a square already",
+        "you square e^T cov^-1 e once more: A1.4 calls it a norm as printed, but it is a square already",
         "1/2 sum (e^T cov^-1 e)^2",
     ),
     "norms-not-squared": (
@@ -32,7 +32,7 @@ NOTES = {
     "covariance-not-inverted": ("you weigh with the covariance; its inverse is wanted", "1/2 sum e^T cov e"),
     "diagonal-only": ("you leave out the correlation of u and v", "1/2 sum e_u^2/s_uu + e_v^2/s_vv"),
     "one-covariance": (
-        "you weigh all with the first covariance: each observation has its own, as in A2.9 with its lost index i",
+        "you weigh all with one covariance: each observation has its own (A2.9 as printed lost the index i)",
         "1/2 sum e^T cov_0^-1 e",
     ),
     "covariance-ignored": ("your cost ignores the covariances", "1/2 sum e^T e"),

@@ -135,9 +135,10 @@ def _damped(J: Array, r: Array, damping: float, rng: np.random.Generator) -> dic
     if np.linalg.matrix_rank(J) == J.shape[1]:
         candidates["not-damped"] = _solve(A, b)
     size = mpmath.norm(step, mpmath.inf)
-    wrong = {
-        note: s for note, s in candidates.items() if mpmath.norm(s - step, mpmath.inf) > mpf("1e-7") * size
-    }
+    wrong: dict[str, Any] = {}
+    for note, other in candidates.items():
+        if all(mpmath.norm(other - s, mpmath.inf) > mpf("1e-7") * size for s in (step, *wrong.values())):
+            wrong[note] = other
     return _case({"J": J, "r": r, "damping": damping, "scale": scale}, step, wrong)
 
 
@@ -167,12 +168,13 @@ def _trace(rng: np.random.Generator, damping: list[float]) -> dict[str, Any]:
         runs["always-taken"] = lambda: _run(y, t, start, damping, always=True)[0]
     if len(set(damping)) > 1:
         runs["damping-late"] = lambda: _run(y, t, start, [damping[0], *damping[:-1]])[0]
-    mistakes = {}
+    mistakes: dict[str, Any] = {}
     for note, run in runs.items():
         with contextlib.suppress(ZeroDivisionError):  # a wrong rule may lead anywhere; only what ends is told
             found = run()
-            if all(abs(v) < 1e6 for s in found for v in s["b"]):
-                mistakes[note] = {"steps": [_record(s) for s in found]}
+            answer = {"steps": [_record(s) for s in found]}
+            if all(abs(v) < 1e6 for s in found for v in s["b"]) and answer not in mistakes.values():
+                mistakes[note] = answer
     inputs = {"y": y, "t": t, "start": start, "damping": damping}
     return {"inputs": inputs, "expected": {"steps": [_record(s) for s in steps]}, "mistakes": mistakes}
 

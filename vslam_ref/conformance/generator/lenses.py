@@ -83,7 +83,7 @@ def project(model: str, params: Sequence[Any], X: Sequence[Any], lens: Lens | No
 
 
 def unproject(model: str, params: Sequence[Any], uv: Sequence[Any], start: Array) -> Vector:
-    """Unit bearing with this pixel, by Newton's iteration in the plane z = 1 (or z = -1) from a point nearby."""
+    """Unit bearing with this pixel, by Newton's iteration in the plane z = 1 or -1 from a point nearby."""
     depth = mpf(1) if start[2] > 0 else mpf(-1)
     x = [mpf(start[0] / abs(start[2])), mpf(start[1] / abs(start[2]))]
 

@@ -29,6 +29,7 @@ NOTES = {
         "your Tukey cost has c^2/6 inside and c^2/3 beyond c: it jumps at c",
         "c^2/6 (1 - (1 - u)^3) inside, c^2/3 beyond",
     ),
+    "tukey-constant": ("your Tukey cost is c^2/3 beyond c; it is c^2/6", "c^2/3 for |x| > c"),
     "tukey-falls-to-zero": ("your Tukey cost is 0 beyond c, where it is c^2/6", "0 for |x| > c"),
     "weight-not-squared": ("your weight is its own root", "1 - u (Tukey), 1/(1 + u) (Geman-McClure)"),
     "huber-without-offset": ("the straight part of your Huber cost starts at the wrong height", "c |x|"),
@@ -137,11 +138,11 @@ def _slope(f: Callable[[Any], Any], x: Any) -> Any:
 
 def _case(what: str, name: str, c: float, x: Array) -> dict[str, Any]:
     right = [value(what, name, v, mpf(c)) for v in vector(x)]
-    mistakes = {}
+    kept: dict[str, list[Any]] = {}
     for note, wrong in _mistakes(what, name, mpf(c), vector(x), right).items():
-        size = max(abs(v) for v in right)
-        if max(abs(a - b) for a, b in zip(wrong, right, strict=True)) > mpf("1e-6") * max(size, mpf("1e-30")):
-            mistakes[note] = {"value": floats(wrong)}
+        if all(_differ(wrong, other) for other in (right, *kept.values())):
+            kept[note] = wrong
+    mistakes = {note: {"value": floats(wrong)} for note, wrong in kept.items()}
     return {
         "inputs": {"name": name, "c": c, "x": x},
         "expected": {"value": floats(right)},
@@ -149,31 +150,51 @@ def _case(what: str, name: str, c: float, x: Array) -> dict[str, Any]:
     }
 
 
+def _differ(a: list[Any], b: list[Any]) -> bool:
+    size = max(abs(v) for v in (*a, *b))
+    return bool(max(abs(v - w) for v, w in zip(a, b, strict=True)) > mpf("1e-6") * size)
+
+
 def _mistakes(what: str, name: str, c: Any, xs: list[Any], right: list[Any]) -> dict[str, list[Any]]:
+    """What wrong formulas answer; where two answer alike, the first is the one that is told."""
+    if name == "tukey" and what == "cost":
+        return _tukey_costs(c, xs, right)
     found: dict[str, list[Any]] = {}
-    u = [(x / c) ** 2 for x in xs]
     if name == "tukey":
-        found["tukey-as-printed"] = [x * (1 - v) if v < 1 else mpf(0) for x, v in zip(xs, u, strict=True)]
+        found["tukey-as-printed"] = _as_printed(c, xs)
     if what == "cost":
-        if name == "tukey":
-            found["tukey-third"] = [2 * v for v in right]
-            found["tukey-mixed"] = [r if v < 1 else 2 * r for r, v in zip(right, u, strict=True)]
-            found["tukey-falls-to-zero"] = [r if v < 1 else mpf(0) for r, v in zip(right, u, strict=True)]
-        else:
-            found["twice"] = [2 * v for v in right]
+        found["twice"] = [2 * v for v in right]
         if name == "huber":
-            found["huber-without-offset"] = [
-                r if v <= 1 else c * abs(x) for r, v, x in zip(right, u, xs, strict=True)
-            ]
+            pairs = zip(right, xs, strict=True)
+            found["huber-without-offset"] = [r if abs(x) <= c else c * abs(x) for r, x in pairs]
         if name != "l2":
             found["cost-of-square"] = [COSTS[name](mpmath.sqrt(abs(x)), c) for x in xs]
     if what == "influence":
         found["weight-for-influence"] = [value("weight", name, x, c) for x in xs]
     if what == "weight" and name in ("tukey", "geman-mcclure"):
         found["weight-not-squared"] = [mpmath.sqrt(abs(v)) for v in right]
-    if what == "weight" and name != "l2":
+    if what == "weight" and name in ("huber", "cauchy", "tukey"):
         costs = [value("cost", name, x, c) for x in xs]
         found["cost-over-square"] = [
             2 * r / x**2 if x != 0 else mpf(1) for r, x in zip(costs, xs, strict=True)
         ]
     return found
+
+
+def _as_printed(c: Any, xs: list[Any]) -> list[Any]:
+    return [x * (1 - (x / c) ** 2) if abs(x) < c else mpf(0) for x in xs]
+
+
+def _tukey_costs(c: Any, xs: list[Any], right: list[Any]) -> dict[str, list[Any]]:
+    inside = [abs(x) < c and x != 0 for x in xs]
+    pairs = list(zip(right, inside, strict=True))
+    mixed, fallen = [r if i else 2 * r for r, i in pairs], [r if i else mpf(0) for r, i in pairs]
+    if not any(inside):  # only the constant shows
+        return {"tukey-constant": mixed, "tukey-falls-to-zero": fallen}
+    return {
+        "tukey-as-printed": _as_printed(c, xs),
+        "tukey-third": [2 * r for r in right],
+        "tukey-mixed": mixed,
+        "tukey-falls-to-zero": fallen,
+        "cost-of-square": [_tukey(mpmath.sqrt(abs(x)), c) for x in xs],
+    }

@@ -12,12 +12,12 @@ from vslam_ref.conformance.generator.building import Topic, tolerance
 TOPIC, CHAPTER = "noise", 4
 SAMPLES = 4000
 FALSE_ALARM = 2e-4
-"""Of each band.  The band holds a Gaussian with 1 - 1e-4; the skewness of a mean of 4000 fourth powers, 10.1 /
-sqrt(4000) = 0.16, raises its upper tail beyond 3.9 sigma by 2.3 (Edgeworth), to 1.2e-4 in all."""
+"""Of each band.  The band holds a Gaussian with 1 - 1e-4; the skewness of a mean of 4000 fourth powers,
+10.1 / sqrt(4000) = 0.16, raises its upper tail beyond 3.9 sigma by 2.3 (Edgeworth), to 1.2e-4 in all."""
 
 NOTES = {
     "uniform-noise": (
-        "your noise is uniform with the right variance: its fourth moment is 9/5 sigma^4 where a Gaussian's is 3",
+        "your noise is uniform with the right variance; its fourth moment is 9/5 sigma^4, a Gaussian's 3",
         "sigma sqrt(12) (u - 1/2)",
     ),
     "uniform-half-width": (

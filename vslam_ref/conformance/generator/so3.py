@@ -33,7 +33,7 @@ NOTES = {
         "I - hat(phi)/2",
     ),
     "uniform-angles": (
-        "your rotations are not uniform: with a uniform angle about a uniform axis, E tr R = 1, E (tr R)^2 = 3",
+        "your rotations are not uniform: a uniform angle about a uniform axis has E tr R = 1, E (tr R)^2 = 3",
         "R = Exp(a n) with a uniform in (0, 2 pi)",
     ),
 }

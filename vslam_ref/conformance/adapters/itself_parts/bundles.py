@@ -31,7 +31,8 @@ def _residual(**inputs: Any) -> Array:
     found = reprojection(_one_view(**inputs))
     if not found.valid.all():
         raise ValueError("the point has no image")
-    return found.r[0]
+    r: Array = found.r[0]
+    return r
 
 
 def _cost(**inputs: Any) -> float:
