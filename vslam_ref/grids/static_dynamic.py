@@ -16,8 +16,8 @@ Three rules are added, each with a switch:
   it back.  0 is the table as it stands: a cell of a wall that was free once is lost for ever.
 * *settling* (the ageing variant): what was hit on free floor for ``settle_seconds``, and never missed later
   than ``hit_gap`` seconds after a hit, has come to stay.  Longer times without a look do not count.  S
-  forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put down on
-  once-free floor is dynamic for ever.
+  forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put
+  down on once-free floor is dynamic for ever.
 
 :data:`AS_PRINTED` has none of the last two.
 """
