@@ -1,4 +1,4 @@
-"""NEES, what its mean may do, and noise that must be Gaussian."""
+"""NEES, and what its mean may do."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact_arrays import big, doubles, inverse, wrap
 from vslam_ref.conformance.generator.exact_quantiles import normal_quantile, quantile
-from vslam_ref.conformance.generator.random_answers import noise, runs
+from vslam_ref.conformance.generator.random_answers import runs
 from vslam_ref.conformance.generator.world import digits
 
 TOPIC, CHAPTER = "consistency", 17
@@ -57,10 +57,6 @@ NOTES = {
         "your noise is uniform where Gaussian is promised",
         "sigma sqrt(3) times uniform in (-1, 1): the same variance, E x^4 = 9/5 sigma^4",
     ),
-    "variance-for-sigma": (
-        "you take sigma for a variance, or the variance for sigma",
-        "sqrt(sigma) or sigma^2 times a standard normal number",
-    ),
     "gtpg": (
         "your predict computes G^T P G: its covariance does not fit its errors",
         "F^T P F + G cov_u G^T",
@@ -77,7 +73,6 @@ def build(rng: np.random.Generator) -> Topic:
     _nees(topic, rng)
     _pose_errors(topic, rng)
     _bands(topic, rng)
-    noise(topic)
     runs(topic)
     return topic
 

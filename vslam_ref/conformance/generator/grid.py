@@ -49,10 +49,6 @@ NOTES = {
         "your D is high where S was unknown for free, or free for unknown: the other of the two readings",
         "d_high at the other d_high_where",
     ),
-    "state-after": (
-        "you look the table up with S after the observation; it is S_t-1",
-        "row of the table from S_t",
-    ),
     "not-bounded": ("your log odds pass the bound", "no clipping"),
     "s-ignores-state": ("your S takes every hit as s_high, on free floor, too", "s_high for s_low"),
     "bresenham": (
@@ -236,9 +232,6 @@ def both_maps(s: float, d: float, seen: str, memory: str, where: str, wrong: str
     of_s, of_d = _entries(state, seen, where if wrong != "d-high-elsewhere" else OTHER[where])
     if wrong == "s-ignores-state" and seen == "hit":
         of_s = "s_high"
-    if wrong == "state-after":
-        later = _state(before + logit(TABLE[of_s]))
-        of_s, of_d = _entries(later, seen, where)
     remembers = (memory == "formula") != (wrong in ("d-remembers", "d-forgets"))
     new_s = before + logit(TABLE[of_s])
     new_d = (mpf(d) if remembers else mpf(0)) + logit(TABLE[of_d])
@@ -267,7 +260,7 @@ def _cell(s: float, d: float, seen: str, memory: str, where: str) -> dict[str, A
     right = both_maps(s, d, seen, memory, where)
     mistakes: dict[str, Any] = {}
     swap = "d-forgets" if memory == "formula" else "d-remembers"
-    for name in (swap, "d-high-elsewhere", "s-ignores-state", "state-after", "not-bounded"):
+    for name in (swap, "d-high-elsewhere", "s-ignores-state", "not-bounded"):
         wrong = both_maps(s, d, seen, memory, where, name)
         known = any(max(abs(a - b) for a, b in zip(wrong, other, strict=True)) < 1e-6 for other in [right])
         same = {"s": float(wrong[0]), "d": float(wrong[1])}

@@ -1,4 +1,4 @@
-"""Noise that must be Gaussian, and filters whose errors must fit their covariance: judged by bands."""
+"""Filters whose errors must fit their covariance: judged by bands."""
 
 from __future__ import annotations
 
@@ -20,40 +20,6 @@ def _around(mean: float, variance: float, samples: int) -> dict[str, float]:
     """Two-sided band of a mean of many independent samples (central limit)."""
     half = float(normal_quantile(1 - mpf(FALSE_ALARM) / 2)) * (variance / samples) ** 0.5
     return {"low": mean - half, "high": mean + half}
-
-
-def noise(topic: Topic) -> None:
-    """Moments of N(0, s^2): E x^2 = s^2, E x^4 = 3 s^4, and their variances from E x^8 = 105 s^8."""
-    samples = 4000
-    for s in (1.0, 0.25):
-        uniform = _around(1.8 * s**4, (9.0 - 1.8**2) * s**8, samples)
-        bands: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
-            "mean": (_around(0.0, s**2, samples), {}),
-            "mean_square": (_around(s**2, 2 * s**4, samples), _swapped(s, samples)),
-            "mean_fourth": (_around(3 * s**4, 96 * s**8, samples), {"uniform-noise": uniform}),
-        }
-        for measure, (band, mistakes) in bands.items():
-            rule: dict[str, Any] = {"output": "values", "measure": measure, "samples": samples, **band}
-            rule["false_alarm"] = FALSE_ALARM
-            if mistakes:
-                rule["mistakes"] = mistakes
-            case = {"inputs": {"N": samples, "sigma": s}, "expected": {"values": []}}
-            flags = ("statistical", measure, "unit" if s == 1.0 else "quarter")
-            oracle = "moments of the normal distribution"
-            topic.group(
-                "consistency.noise",
-                "eq-nees",
-                oracle,
-                tolerance(0.0, "a band"),
-                [case],
-                flags=flags,
-                statistic=rule,
-            )
-
-
-def _swapped(s: float, samples: int) -> dict[str, Any]:
-    """Bands of the mean square where sigma is taken for a variance."""
-    return {} if s == 1.0 else {"variance-for-sigma": _around(s, 2 * s**2, samples)}
 
 
 def runs(topic: Topic) -> None:

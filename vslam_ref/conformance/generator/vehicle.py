@@ -168,8 +168,11 @@ def _other_convention(inputs: list[Any]) -> dict[str, Any]:
 
 
 def _case(inputs: dict[str, Any], right: Big, wrong: dict[str, Big]) -> dict[str, Any]:
-    """A case; a wrong formula that gives (nearly) the right value is no mistake of this case."""
-    far = {name: value for name, value in wrong.items() if max(abs(v) for v in value - right) > 1e-9}
-    mistakes = {name: {"x": doubles(value)} for name, value in far.items()}
+    """A case; a wrong formula that gives nearly the right value, or another's, is none of its mistakes."""
+    apart, known = {}, [right]
+    for name, value in wrong.items():
+        if all(max(abs(v) for v in value - other) > 1e-9 for other in known):
+            apart[name] = {"x": doubles(value)}
+            known.append(value)
     case = {"inputs": inputs, "expected": {"x": doubles(right)}}
-    return {**case, "mistakes": mistakes} if mistakes else case
+    return {**case, "mistakes": apart} if apart else case

@@ -38,6 +38,5 @@ TABLE: Answers = {
         zip(("low", "high"), consistency.mean_band(runs, dof, confidence), strict=True)
     ),
     "consistency.bound": lambda runs, dof, confidence: consistency.mean_line(runs, dof, confidence),
-    "consistency.noise": lambda N, sigma: sigma * np.random.default_rng().standard_normal(N),
     "consistency.runs": _runs,
 }
