@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vslam_ref._kernels import accelerated
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
-from vslam_ref.grids.rays import HIT, MISS, look
+from vslam_ref.grids.rays import MISS, look
 from vslam_ref.grids.static_dynamic import MapConfig
 
 Array = NDArray[np.float64]
@@ -73,9 +73,8 @@ def apply_plain(
         Largest log-odds.
     """
     whole = log_odds.reshape(-1, columns)
-    rows, places, window = look(whole.shape, start, ends, hit)
-    part = whole[rows, places]
-    hits = np.nonzero(window == HIT)
-    part += (window == MISS) * evidence[0]
-    part[hits] += evidence[1]
+    seen = look(whole.shape, start, ends, hit)
+    part = whole[seen.rows, seen.columns]
+    part += (seen.window == MISS) * evidence[0]
+    part[seen.hits] += evidence[1]
     np.clip(part, -bound, bound, out=part)

@@ -141,26 +141,26 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
 
 
 class _Rows(NamedTuple):
-    """Rows (G, K) at which beams enter and leave their columns; beyond a beam's end, its last row."""
+    """Columns (G, K) of beams, and the rows at which they enter and leave; the last column is repeated."""
 
+    column: Array
     enter: Array
     leave: Array
 
 
 def _rows_of_columns(w: Walks, beams: IntArray) -> _Rows:
     """Rows in which some mirrored beams cross each of their columns."""
-    k = np.arange(int(w.columns[beams].max(initial=0)) + 1)
+    last = w.columns[beams] - 1
+    k = np.minimum(np.arange(int(last.max(initial=0)) + 2.0), last[:, None])
     height = w.rise[beams, None] * k
     height += w.offset[beams, None]
-    height /= w.run[beams, None]  # at the left line of column k
-    last = w.last_row[beams, None]
+    height /= w.run[beams, None]  # at the left line of the column
     enter = np.floor(height[:, :-1])
     enter[:, :1] = 0.0
-    np.minimum(enter, last, out=enter)
     leave = np.ceil(height[:, 1:])  # at the right line, seen from below
     leave -= 1.0
-    np.minimum(leave, last, out=leave)
-    return _Rows(enter, np.maximum(leave, enter, out=leave))
+    leave[np.arange(len(last)), last] = w.last_row[beams]
+    return _Rows(k[:, :-1], enter, np.maximum(leave, enter, out=leave))
 
 
 def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
@@ -182,25 +182,29 @@ def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArra
     A cell in which one beam ends and which another crosses is a HIT: the scan is one observation,
     and the thing need not fill the cell.
     """
+    np.maximum(window, _marks(window.shape[0], window.shape[1], start, ends, hit), out=window)
+
+
+def _marks(rows: int, columns: int, start: Array, ends: Array, hit: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """What a scan says of a window that nothing was said of before."""
     w = walks(start, ends)
-    strides = np.array([1, window.shape[1]])
+    strides = np.array([1, columns])
     steps = (w.signs * strides).astype(np.float64)
     along = np.where(w.steep, steps[:, 1], steps[:, 0])
     across = np.where(w.steep, steps[:, 0], steps[:, 1])
     first = (w.start @ strides).astype(np.float64)
-    marks = np.zeros(window.size, dtype=np.uint8)
+    marks = np.zeros(rows * columns, dtype=np.uint8)
     order = np.argsort(w.columns)  # like lengths together
     for beams in (order[n : n + GROUP] for n in range(0, len(order), GROUP)):
-        enter, leave = _rows_of_columns(w, beams)
-        column = np.minimum(np.arange(enter.shape[1]), w.columns[beams, None] - 1.0)
-        column *= along[beams, None]
+        column, enter, leave = _rows_of_columns(w, beams)
+        column = column * along[beams, None]
         column += first[beams, None]
         for row in (enter, leave):
             row *= across[beams, None]
             row += column
             marks[row.astype(np.int64)] = MISS
     marks[end_cells(ends[hit]) @ strides] = HIT
-    window[...] = np.maximum(window, marks.reshape(window.shape))
+    return marks.reshape(rows, columns)
 
 
 def end_cells(ends: Array) -> IntArray:
@@ -215,6 +219,13 @@ class Look(NamedTuple):
     rows: slice
     columns: slice
     window: NDArray[np.uint8]
+
+    @property
+    def hits(self) -> tuple[IntArray, IntArray]:
+        """Rows and columns of the window's hits."""
+        found = np.flatnonzero(self.window.reshape(-1) == HIT)  # in two dimensions ten times slower
+        row, column = np.divmod(found, self.window.shape[1])
+        return row, column
 
 
 def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool_]) -> Look:
@@ -233,6 +244,5 @@ def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool
     high = np.floor(np.maximum(ends.max(axis=0), start)).astype(np.int64) + 2
     if (low < 0).any() or high[0] > shape[1] or high[1] > shape[0]:
         raise ValueError(OUTSIDE)
-    window = np.zeros((high[1] - low[1], high[0] - low[0]), dtype=np.uint8)
-    mark_beams(window, start - low, ends - low, hit)
+    window = _marks(int(high[1] - low[1]), int(high[0] - low[0]), start - low, ends - low, hit)
     return Look(slice(low[1], high[1]), slice(low[0], high[0]), window)

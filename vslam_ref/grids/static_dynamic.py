@@ -233,8 +233,9 @@ def apply_scan(
     """
     s_bound, d_bound, lifetime, settle, gap, reach = limits.tolist()
     whole = [layer.reshape(-1, columns) for layer in (s, d, seen, last_hit, since)]
-    rows, places, window = rays.look(whole[0].shape, start, ends, hit)
-    missed, hits = window == rays.MISS, np.nonzero(window == rays.HIT)
+    look = rays.look(whole[0].shape, start, ends, hit)
+    rows, places, window = look
+    missed, hits = window == rays.MISS, look.hits
     explained = _near_static(whole[0], hits[0] + rows.start, hits[1] + places.start, int(reach))
     s, d, seen, last_hit, since = (layer[rows, places] for layer in whole)  # views
 
