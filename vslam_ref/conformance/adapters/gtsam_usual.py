@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.conformance.adapters.table import answer_from
+from vslam_ref.conformance.adapters.table import Answers, answer_from
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def answer(function: str, inputs: dict[str, Any]) -> Any:
     """Answer one question with GTSAM's defaults."""
     if importlib.util.find_spec("gtsam") is None:
         raise NotImplementedError("GTSAM is not installed")
-    table = {"camera.unproject": _unproject, "multiview.triangulate_optimal": _optimal}
+    table: Answers = {"camera.unproject": _unproject, "multiview.triangulate_optimal": _optimal}
     return answer_from(table, function, inputs)
 
 

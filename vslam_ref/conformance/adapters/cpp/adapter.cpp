@@ -221,15 +221,23 @@ void write(std::string& out, const Json& j) {
 
 // -------------------------------------------------------------- 2 matrices
 
-using Vec = std::vector<double>;
+struct Vec : std::vector<double> {  // a wrong index is an error that is told, not a crash
+  using std::vector<double>::vector;
+  double& operator[](size_t k) { return at(k); }
+  double operator[](size_t k) const { return at(k); }
+};
 
 struct Mat {  // rows x cols, row by row
   int rows = 0, cols = 0;
   Vec a;
   Mat() = default;
-  Mat(int r, int c) : rows(r), cols(c), a(static_cast<size_t>(r * c), 0.0) {}
-  double& operator()(int i, int j) { return a[static_cast<size_t>(i * cols + j)]; }
-  double operator()(int i, int j) const { return a[static_cast<size_t>(i * cols + j)]; }
+  Mat(int r, int c) : rows(r), cols(c), a(static_cast<size_t>(r) * static_cast<size_t>(c), 0.0) {}
+  double& operator()(int i, int j) { return a[index(i, j)]; }
+  double operator()(int i, int j) const { return a[index(i, j)]; }
+  size_t index(int i, int j) const {
+    if (i < 0 || j < 0 || i >= rows || j >= cols) throw std::runtime_error("matrix of another size");
+    return static_cast<size_t>(i * cols + j);
+  }
 };
 
 Mat eye(int n) {
@@ -238,6 +246,7 @@ Mat eye(int n) {
   return M;
 }
 Mat operator*(const Mat& A, const Mat& B) {
+  if (A.cols != B.rows) throw std::runtime_error("matrices that do not fit");
   Mat C(A.rows, B.cols);
   for (int i = 0; i < A.rows; ++i)
     for (int k = 0; k < A.cols; ++k)
@@ -254,6 +263,7 @@ Mat operator+(Mat A, const Mat& B) {
 }
 Mat operator-(const Mat& A, const Mat& B) { return A + -1.0 * B; }
 Vec operator*(const Mat& A, const Vec& x) {
+  if (A.cols != static_cast<int>(x.size())) throw std::runtime_error("matrix and vector that do not fit");
   Vec y(static_cast<size_t>(A.rows), 0.0);
   for (int i = 0; i < A.rows; ++i)
     for (int j = 0; j < A.cols; ++j) y[i] += A(i, j) * x[j];
@@ -290,7 +300,10 @@ void put(Mat& A, int i0, int j0, const Mat& B) {
   for (int i = 0; i < B.rows; ++i)
     for (int j = 0; j < B.cols; ++j) A(i0 + i, j0 + j) = B(i, j);
 }
-Vec part(const Vec& v, int from, int count) { return Vec(v.begin() + from, v.begin() + from + count); }
+Vec part(const Vec& v, int from, int count) {
+  if (from + count > static_cast<int>(v.size())) throw std::runtime_error("too few numbers");
+  return Vec(v.begin() + from, v.begin() + from + count);
+}
 Mat column(const Vec& v) {
   Mat M(static_cast<int>(v.size()), 1);
   M.a = v;
@@ -648,14 +661,19 @@ std::array<T, 2> lens(const std::string& model, const std::vector<T>& p, const s
     const T A = tan_ratio(p[4]), W = p[4] * A, F = A * arctan_ratio(W * W * q);
     return {F * x, F * y};
   }
-  if (model != "radtan" && model != "rational") throw std::invalid_argument(model);
   T G = T(1.0) + q * (p[4] + q * (p[5] + q * p[8]));
   if (model == "rational") G = G / (T(1.0) + q * (p[9] + q * (p[10] + q * p[11])));
   const T two(2.0), s = two * (p[7] * x + p[6] * y);
   return {G * x + q * p[7] + s * x, G * y + q * p[6] + s * y};
 }
+const std::map<std::string, size_t> PARAMETERS = {
+    {"pinhole", 4}, {"fov", 5}, {"radtan", 9}, {"rational", 12}, {"fisheye", 8}};
+
 template <class T>
 std::array<T, 2> project(const std::string& model, const std::vector<T>& p, const std::array<T, 3>& X) {
+  const auto known = PARAMETERS.find(model);
+  if (known == PARAMETERS.end()) throw std::invalid_argument(model);
+  if (p.size() != known->second) throw std::runtime_error("wrong number of parameters of " + model);
   const std::array<T, 2> xd = lens(model, p, X);
   return {p[0] * xd[0] + p[2], p[1] * xd[1] + p[3]};
 }
@@ -715,6 +733,7 @@ Json camera_project(const std::string& model, const Vec& p, const Vec& X) {
 }
 
 Vec camera_unproject(const std::string& model, const Vec& p, const Vec& uv) {  // unit bearing, or refuses
+  project<double>(model, p, {0.0, 0.0, 1.0});  // knows the model, or refuses
   const double xd = (uv[0] - p[2]) / p[0], yd = (uv[1] - p[3]) / p[1], d = std::hypot(xd, yd);
   if (model == "pinhole") return (1.0 / norm({xd, yd, 1.0})) * Vec{xd, yd, 1.0};
   if (model == "fov") {

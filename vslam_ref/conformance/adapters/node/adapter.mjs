@@ -453,6 +453,11 @@ const withNumbers = (value, name) => {
 const withWords = (_, x) =>
   typeof x !== "number" || Number.isFinite(x) ? x : Number.isNaN(x) ? "nan" : x > 0 ? "inf" : "-inf";
 
+function present(inputs, key) {
+  if (!(key in inputs)) throw new Error(`no input ${key}`);
+  return inputs[key];
+}
+
 function reply(line) {
   let request;
   try {
@@ -461,10 +466,10 @@ function reply(line) {
     return { id: null, error: `not JSON: ${error.message}` };
   }
   const { id, function: name, inputs } = request;
-  if (!(name in TABLE)) return { id, unsupported: true };
+  if (!Object.hasOwn(TABLE, name)) return { id, unsupported: true };
   try {
     const given = Object.entries(inputs).map(([key, value]) => [key, withNumbers(value, key)]);
-    return { id, value: TABLE[name](Object.fromEntries(given)) };
+    return { id, value: TABLE[name](new Proxy(Object.fromEntries(given), { get: present })) };
   } catch (error) {
     return error.unsupported ? { id, unsupported: true } : { id, error: error.message };
   }
