@@ -150,6 +150,14 @@ def test_beyond_the_maximum_range_nothing_returns() -> None:
     assert np.isinf(recording.ranges[0]).any()
     assert recording.exact_ranges[np.isfinite(recording.exact_ranges)].max() <= 2.0
     np.testing.assert_array_equal(recording.owner == -1, np.isinf(recording.exact_ranges))
+    # a beam that meets nothing crosses its last cell, too
+    cells, pose = cover(recording), recording.poses[0]
+    seen, free = seen_cells(recording, 0, cells), np.isinf(recording.exact_ranges[0])
+    angles = pose[2] + recording.angles[free]
+    last = pose[:2] + (2.0 - 1e-9) * np.stack([np.cos(angles), np.sin(angles)], 1)
+    column, row = np.floor((last - cells.origin_xy) / 0.1).astype(int).T
+    assert free.sum() > 50
+    assert seen.crossed[row, column].all()
 
 
 def test_the_same_seed_gives_the_same_world_and_another_laser_the_same_people() -> None:

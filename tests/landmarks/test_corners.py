@@ -167,3 +167,14 @@ def test_arms_are_static_where_s_says_so(make_grid: Callable[..., LogOddsGrid]) 
     np.testing.assert_allclose(share, [1.0, 0.0, 0.0, 0.0], atol=0.25)
     assert share[0] == 1.0
     assert len(static_along_arms(grid, np.zeros((0, 2)), np.zeros((0, 2)))) == 0
+
+
+def test_a_half_sure_corner_is_weaker_than_a_sure_one(make_grid: Callable[..., LogOddsGrid]) -> None:
+    """Weights grow with P: the same L at 0.93 and at 0.993; and a strong L without a decided cell is none."""
+    from vslam_ref.grids.landmarks import MapCornerConfig
+
+    weak, strong = (map_corners(make_grid(L_SHAPE, value=v)).strength[0] for v in (2.6, 5.0))
+    assert 0.8 * strong < weak < 0.95 * strong
+    strict = MapCornerConfig(decided=0.95)
+    assert len(map_corners(make_grid(L_SHAPE, value=2.6), strict).xy) == 0
+    assert len(map_corners(make_grid(L_SHAPE, value=5.0), strict).xy) == 1

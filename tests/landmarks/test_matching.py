@@ -172,3 +172,29 @@ def test_thinning_keeps_one_point_a_cell() -> None:
     lattice = Lattice(0.5).grown([-2, -2], [2, 2])
     assert lattice.inside(lattice.cells_from_world(t)).all()
     assert se2.act([0, 0, 0], t).shape == t.shape
+
+
+def test_a_match_is_the_minimum_of_its_objective(make_grid: Callable[..., LogOddsGrid]) -> None:
+    """SciPy's simplex from the match finds nothing lower; a strong prior far off draws the match to itself.
+
+    Distances have kinks, so that neither is exact: 1 mm and 1 mrad.
+    """
+    from scipy.optimize import minimize
+
+    from vslam_ref.grids.landmarks.matching import Objective
+
+    field, segments = room(make_grid)
+    pose = np.array([2.31, 2.47, 0.7])
+    points = thin(points_from(pose, segments), 0.1)
+    pulled = []
+    for sigma in (0.1, 0.01, 0.003):
+        cov = np.diag([sigma, sigma, sigma / 2]) ** 2
+        predicted = pose + [0.06, 0.0, 0.0]
+        found = match_scan(field, points, predicted, cov)
+        o = Objective(field, points, predicted, np.linalg.inv(cov), MatchConfig().sigma)
+        least = minimize(lambda p, o=o: float(o.cost(p)[0]), found.pose, method="Nelder-Mead")
+        np.testing.assert_allclose(found.pose, least.x, atol=1e-3)
+        pulled.append(found.pose[0] - pose[0])
+    assert pulled[0] < 0.005
+    assert pulled[0] < pulled[1] < pulled[2]
+    assert pulled[2] > 0.02, "a prediction that is sure of itself must count"

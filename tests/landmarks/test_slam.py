@@ -136,3 +136,38 @@ def test_starts_that_mean_nothing_are_refused(start: list[float]) -> None:
 def test_the_first_increment_is_none(hall: HallRun) -> None:
     assert increment_of(hall.recording, 0) is None
     assert scan_of(hall.recording, 3).time == pytest.approx(0.6)
+
+
+def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:
+    """Robot and landmark lost together by a metre: a corner 0.3 m beside the landmark is not this landmark.
+
+    Without the cross terms the gate would be 4 m wide and take it.  Counted from the filter's own full
+    covariance: S = J P J^T + cov_z by brute force.
+    """
+    from vslam_ref.filters import observation
+    from vslam_ref.grids.landmarks import Corners
+    from vslam_ref.grids.landmarks.landmark_map import Landmark
+
+    slam = GridSlam([0.0, 0.0, 0.0], start_sigma=(1.0, 1e-3))
+    z, cov_z = np.array([2.0, 0.5]), 1e-4 * np.eye(2)
+    slam.filter.update(np.array([0]), z[None, None], cov_z)
+    slam.landmarks.landmarks.append(Landmark(0, 0.3, np.pi / 2, True, np.array([1.1, -0.5]), born=0))
+    J = observation.vehicle_from_world_with_jacobians(slam.pose, slam.places()[0])
+    _, P = (a[0] for a in slam.filter.blocks.full())
+    H = np.hstack([J.J_pose, J.J_landmark])
+    S = H @ P @ H.T + cov_z
+    assert np.sqrt(S.max()) < 0.05
+    for step, expected in ((2.9, 0), (3.2, -1)):  # sigmas; the gate is 3.03
+        way = np.linalg.cholesky(S) @ [step, 0.0]
+        corner = Corners(
+            (z + way)[None],
+            cov_z[None],
+            np.array([0.3]),
+            np.array([np.pi / 2]),
+            np.array([True]),
+            np.zeros((1, 2)),
+        )
+        trial = GridSlam([0.0, 0.0, 0.0], start_sigma=(1.0, 1e-3))
+        trial.filter.update(np.array([0]), z[None, None], cov_z)
+        trial.landmarks.landmarks.append(Landmark(0, 0.3, np.pi / 2, True, np.array([1.1, -0.5]), born=0))
+        assert trial._use(corner).tolist() == [expected]

@@ -60,7 +60,7 @@ def test_the_aims_of_the_separation() -> None:
 
 
 def localised(ratio: float, growth: float, fall: float) -> grids_localisation.Study:
-    """Errors of 0.1 m on an empty floor, times ``growth`` in the crowd; separated / plain = ``ratio`` there."""
+    """Errors of 0.1 m on an empty floor, times ``growth`` in the crowd; separated / plain is ``ratio``."""
     config = localisation.LocalisationConfig(runs=8, densities=(0.0, 0.4), errors=(0.0, 0.1))
     wobble = np.exp(0.05 * np.random.default_rng(2).standard_normal((2, 8, 2)))
     rmse = 0.1 * wobble
@@ -123,9 +123,27 @@ def test_a_map_that_says_what_is_true_gets_full_marks() -> None:
     assert separation.precision_recall(np.zeros(4)).tolist() == [1.0, 1.0]
 
 
+def test_the_truth_of_a_cell_is_that_of_the_last_look() -> None:
+    """The box left its first place before the robot's eyes: it is asked for where it is now."""
+    from vslam_ref.worlds.floor_plan import cell_truth, cover, seen_cells
+
+    world = dataclasses.replace(SMALL, crowd=CrowdConfig(density=0.0), memory=1.0)
+    recording = simulate(world, np.random.default_rng(4))
+    run = separation.measure(recording, separation.SeparationConfig(map=MapConfig(d_memory="text")))
+    cells = cover(recording)
+    first, last = (cell_truth(recording, k, cells).static for k in (0, len(recording) - 1))
+    ended = np.zeros(cells.shape, dtype=int)
+    for k in range(len(recording)):
+        ended += seen_cells(recording, k, cells).ended & cell_truth(recording, k, cells).static
+    assert ((ended >= 5) & first & ~last).sum() > 5, "the box was seen where it stood"
+    assert run.static[0, 2] == (last & (ended >= 5)).sum()
+
+
 def test_beams_are_judged_by_what_they_end_on() -> None:
-    """Counts by a second route: loop over beams, D looked up one by one."""
-    recording = simulate(SMALL, np.random.default_rng(2))
+    """By a second route: loop over beams, look up D one by one.  After T = 1 s the box is static again."""
+    recording = simulate(dataclasses.replace(SMALL, memory=1.0), np.random.default_rng(2))
+    assert recording.moving[25:, 1].any()
+    assert not recording.moving[25:, 1].all()
     config = localisation.LocalisationConfig().slam
     poses, total, _ = localisation.localise(recording, config)
     assert total[0] <= min(total[1], total[2])
