@@ -68,7 +68,7 @@ def log_figure(
             axes.plot(walk[:, 0], walk[:, 1], color=style.VERMILION, lw=1.6, label=None if k else "moved")
         axes.set_title("D: where something moved, and when it last did")
         if len(moved_xy):
-            figure.colorbar(dots, ax=axes, label="time [min]", shrink=0.8)
+            figure.colorbar(dots, ax=panels, label="D: time [min]", shrink=0.4, anchor=(0.0, 0.0))
         axes.legend(loc="upper right", framealpha=0.9, markerscale=3)
         figure.suptitle(title)
     return figure
