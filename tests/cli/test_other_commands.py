@@ -127,8 +127,8 @@ def test_bench_prints_a_table_and_writes_the_numbers(suite, tmp_path, capsys):
 def test_an_unknown_suite_is_told_before_any_work(suite, capsys):
     assert cli.main(["bench", "filter"]) == 2
     shown = capsys.readouterr()
-    known = ", ".join(bench.SUITES)
-    assert shown.err == f"vslam-ref: error: unknown suite 'filter' (did you mean 'filters'?); known: {known}\n"
+    told = f"unknown suite 'filter' (did you mean 'filters'?); known: {', '.join(bench.SUITES)}"
+    assert shown.err == f"vslam-ref: error: {told}\n"
     assert shown.out == ""
 
 

@@ -96,6 +96,10 @@ def test_what_goes_to_and_fro_does_not_move() -> None:
     for k in range(200):
         tracker.update(0.25 * k, seen((2.0 + rng.uniform(-0.3, 0.3), 0.0)))
     assert tracker.moved == {}
+    for k in range(200, 320):  # then it stands still, but for noise, and walks
+        x = 2.0 + rng.normal(0, 0.02)
+        tracker.update(0.25 * k, seen((x, 0.3 * max(k - 300, 0))))
+        assert len(tracker.moved) == (k >= 304)  # 1.2 m away; one step before it was 0.9 m
     walker = Tracker()
     for k in range(12):
         walker.update(0.25 * k, seen((2.0 + rng.normal(0, 0.03), 0.3 * k)))

@@ -7,11 +7,13 @@
   ``gate``.  What is left begins a track; what was not seen for ``lost_seconds`` ends.
 * *Velocity* is the slope of the line through the places of the last ``velocity_seconds``, by least squares.
 * A track is *moving* when it was seen in ``confirm`` scans and has come ``least_move`` metres away from where
-  it began, on a way not more than ``wander`` times as long: the flicker of a table's legs goes to and fro.
+  it was ``move_seconds`` ago, on a way not more than ``wander`` times as long: the flicker of a table's legs
+  goes to and fro.
 """
 
 from __future__ import annotations
 
+import bisect
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -37,11 +39,14 @@ class TrackConfig:
     velocity_seconds: float = field(default=1.0, metadata={"reason": "a step or two", "unit": "s"})
     confirm: int = field(default=5, metadata={"reason": "scans; fewer give no velocity worth the name"})
     least_move: float = field(default=1.0, metadata={"reason": "more than the size of a table", "unit": "m"})
+    move_seconds: float = field(
+        default=5.0, metadata={"reason": "what stood before does not count; 0.2 m/s still moves", "unit": "s"}
+    )
     wander: float = field(default=1.6, metadata={"reason": "noise of a centre lengthens the way of a walker"})
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for name in ("join", "gate", "lost_seconds", "velocity_seconds", "least_move"):
+        for name in ("join", "gate", "lost_seconds", "velocity_seconds", "least_move", "move_seconds"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must be positive")
         if self.least_cells < 1 or self.confirm < 2 or not self.wander >= 1:
@@ -129,16 +134,6 @@ class Track:
         """Where the thing is at ``time`` if it goes on as it did."""
         return self.places[-1] + self.velocity * (time - self.times[-1])
 
-    @property
-    def displacement(self) -> float:
-        """Distance of the place now from the first, metres."""
-        return float(np.linalg.norm(self.places[-1] - self.places[0]))
-
-    @property
-    def way(self) -> float:
-        """Length of the way from place to place, metres."""
-        return float(np.linalg.norm(np.diff(self.places, axis=0), axis=1).sum())
-
 
 class Tracker:
     """Follows clusters.
@@ -213,9 +208,13 @@ class Tracker:
 
     def _is_moving(self, track: Track) -> bool:
         c = self.config
-        if len(track.times) < c.confirm or track.displacement < c.least_move:
+        first = bisect.bisect_left(track.times, track.times[-1] - c.move_seconds)
+        recent = np.array(track.places[first:])
+        displacement = float(np.linalg.norm(recent[-1] - recent[0]))
+        if len(recent) < c.confirm or displacement < c.least_move:
             return False
-        return track.way <= c.wander * track.displacement
+        way = float(np.linalg.norm(np.diff(recent, axis=0), axis=1).sum())
+        return way <= c.wander * displacement
 
 
 def slope(times: list[float], places: list[Array], seconds: float) -> Array:
