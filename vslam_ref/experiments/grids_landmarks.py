@@ -134,8 +134,8 @@ def figure(result: Result) -> Figure:
 
 
 def quick(config: ChoiceConfig) -> ChoiceConfig:
-    """Three runs of 20 s."""
-    return dataclasses.replace(config, runs=3, world=dataclasses.replace(config.world, duration=20.0))
+    """Three runs of 15 s."""
+    return dataclasses.replace(config, runs=3, world=dataclasses.replace(config.world, duration=15.0))
 
 
 EXPERIMENT = Experiment(

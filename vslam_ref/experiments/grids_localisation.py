@@ -169,8 +169,8 @@ def figure(result: Result) -> Figure:
 
 
 def quick(config: LocalisationConfig) -> LocalisationConfig:
-    """Two runs of 10 s, an empty floor and one crowd."""
-    world = dataclasses.replace(config.world, duration=10.0)
+    """Two runs of 8 s, an empty floor and one crowd."""
+    world = dataclasses.replace(config.world, duration=8.0)
     return dataclasses.replace(
         config, runs=2, densities=(0.0, 0.2), errors=(0.0, SPOILED), error_density=0.2, world=world
     )

@@ -142,8 +142,8 @@ def figure(result: Result) -> Figure:
 
 
 def quick(config: SeparationConfig) -> SeparationConfig:
-    """Two runs of 16 s at two densities."""
-    world = dataclasses.replace(config.world, duration=16.0)
+    """Two runs of 12 s at two densities."""
+    world = dataclasses.replace(config.world, duration=12.0)
     return dataclasses.replace(config, runs=2, densities=(0.0, JUDGED), world=world)
 
 

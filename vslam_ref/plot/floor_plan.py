@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.geometry import se2
@@ -218,12 +219,20 @@ def localisation_figure(densities: Array, rmse: Array, errors: Array, f_scores: 
             left.plot(100 * densities, mean, look.line, color=look.colour, lw=2, label=look.name)
         left.set(title="position error; dots: runs", xlabel="free floor covered by bodies [%]", yscale="log")
         left.set_ylabel("RMSE of the position [m]")
+        _plain_numbers(left)
         left.legend(frameon=False)
         right.plot(100 * errors, f_scores.T, ".", color=style.BLUE, ms=6, alpha=0.6)
         right.plot(100 * errors, f_scores.mean(axis=0), "-", color=style.BLUE, lw=2)
         right.set(title="D, drawn from wrong poses", xlabel="error of each pose, standard deviation [cm]")
         right.set_ylabel("F score of D, per beam")
     return figure
+
+
+def _plain_numbers(axes: Axes) -> None:
+    """Write 0.1, 0.2, 0.5 on a logarithmic axis."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def choice_figure(rmse: Array, counts: Mapping[str, Array], modes: Sequence[str]) -> Figure:
@@ -252,10 +261,12 @@ def choice_figure(rmse: Array, counts: Mapping[str, Array], modes: Sequence[str]
             look = MODES[mode]
             left.plot(1 + np.arange(len(rmse)), rmse[order, m], look.line, marker="o", ms=4,
                       color=look.colour, label=look.name)  # fmt: skip
+        left.xaxis.set_major_locator(MaxNLocator(integer=True))
         left.set(
             title="position error, landmarks only", xlabel="run, in order of the first error", yscale="log"
         )
         left.set_ylabel("RMSE of the position [m]")
+        _plain_numbers(left)
         left.legend(frameon=False)
         y = np.arange(len(words))[::-1]
         for m, mode in enumerate(modes[:2]):

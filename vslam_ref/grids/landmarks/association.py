@@ -65,6 +65,8 @@ def look_alike(a: Signature, b: Signature, turn: float = TURN, opening: float = 
 def gate(innovation: ArrayLike, S: ArrayLike) -> Array:
     """Squared Mahalanobis distances (...,) of innovations (..., 2) with covariances (..., 2, 2).
 
+    Implements the left side of :eq:`eq-gate`.
+
     Examples
     --------
     >>> gate([3.0, 0.0], [[9.0, 0.0], [0.0, 1.0]])

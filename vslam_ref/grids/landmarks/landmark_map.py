@@ -127,7 +127,10 @@ class Chosen(NamedTuple):
 
 @dataclass
 class LandmarkMap:
-    """All landmarks, and the corners that may become some."""
+    """All landmarks, and the corners that may become some.
+
+    Implements the third map of A§4.4, the landmarks taken from S.
+    """
 
     config: LandmarkConfig = field(default_factory=LandmarkConfig)
     of_s: MapCornerConfig = field(default_factory=MapCornerConfig)

@@ -176,7 +176,10 @@ def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike 
 
 
 def fit_lines(points: Array, beams: IntArray, runs: list[tuple[int, int]], sigma: float) -> Lines:
-    """Lines by total least squares through ``points[a:b]`` for each run (a, b) of ``beams``."""
+    """Lines by total least squares through ``points[a:b]`` for each run (a, b) of ``beams``.
+
+    Implements :eq:`eq-line-variances`.
+    """
     centre, angle, offset, turn = (
         np.empty((len(runs), 2)),
         np.empty(len(runs)),
@@ -242,7 +245,7 @@ def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | No
     Returns
     -------
     Corners
-        With covariances from both lines' and :eq:`eq-corner-cov`; possibly none.
+        With the covariance of both lines, :eq:`eq-corner-cov`; possibly none.
 
     Raises
     ------

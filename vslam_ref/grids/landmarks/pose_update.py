@@ -24,6 +24,8 @@ def pose_measurement(
 ) -> tuple[Array, Array, Array]:
     """Turn a match into a linear measurement H x = z with independent errors.
 
+    Implements :eq:`eq-match-measurement`.
+
     A match maximises prediction times likelihood, so that at its pose x, with the prediction's P,
     A (z - x) = P^-1 (x - predicted): the likelihood's own maximum z lies beyond x, seen from the prediction.
 

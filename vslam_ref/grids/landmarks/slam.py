@@ -86,6 +86,8 @@ class Step(NamedTuple):
 class GridSlam:
     """SLAM with grids and landmarks, from a known start.
 
+    Implements A§4.4: landmarks from S, and a robot that localises by them.
+
     Parameters
     ----------
     start : array_like, shape (3,)
