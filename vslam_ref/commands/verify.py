@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from vslam_ref.commands.options import add_json, json_target, write_json
 
 if TYPE_CHECKING:
+    from vslam_ref.conformance.nees_runs import Judgement
     from vslam_ref.conformance.program import Asked
     from vslam_ref.conformance.runner import Report
     from vslam_ref.conformance.vectors_format import VectorFile
@@ -22,7 +23,9 @@ The program is started once. It reads one request a line and writes one reply a 
 'vslam-ref vectors list' names the functions. A program with conventions of its own says so in a JSON file:
   {"transform": "world_from_cam", "perturbation": "right", "tangent_order": "rotation_first"}
 
---nees judges a filter from its simulated runs: a CSV or .npz with the columns run, step, error, covariance.
+--nees judges a filter by its simulated runs, at least 10, each with the same steps: a CSV with the columns
+run, step, e1..ed, P11..Pdd (row by row), or an .npz with the arrays run, step, error, covariance. Its
+--report is a page (.html) or the figure alone (.png, .svg).
 
 Status: 0 all answered cases pass, 1 some fail, 2 bad use.
 
@@ -48,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--float32", action="store_true", help="tolerances of single precision")
     parser.add_argument("--timeout", metavar="S", type=float, default=10.0, help="seconds a reply may take")
     parser.add_argument("--report", metavar="FILE", help="write a page with every failure")
-    parser.add_argument("--dof", metavar="D", type=int, help="with --nees: length of the error")
+    parser.add_argument("--dof", metavar="D", type=int, help="with --nees: length d of the error")
     add_json(parser)
 
 
@@ -146,4 +149,45 @@ def _short(value: Any, most: int = 300) -> str:
 
 def _nees(options: argparse.Namespace, target: Path | None, page: Path | None) -> int:
     """Judge a filter's runs."""
-    raise NotImplementedError
+    from vslam_ref.conformance.nees_files import read
+    from vslam_ref.conformance.nees_runs import MEANINGS, judge
+
+    if page is not None and page.suffix not in (".html", ".png", ".svg"):
+        raise ValueError(f"--report {page}: need a name that ends in .html, .png or .svg")
+    runs = read(Path(options.nees), options.dof)
+    found = judge(runs)
+    print(f"{options.nees}: {found.runs} runs of {found.steps} steps, errors of {found.dof} numbers")
+    if found.invalid:
+        print(
+            f"{found.invalid} covariances of {found.runs * found.steps} are not symmetric positive definite"
+        )
+    else:
+        _show_windows(found)
+    print(f"{found.verdict}: {MEANINGS[found.verdict]}")
+    if page is not None:
+        from vslam_ref.conformance.nees_page import write
+
+        write(page, str(options.nees), runs, found)
+    write_json(target, found.numbers())
+    return 0 if found.consistent else 1
+
+
+def _show_windows(found: Judgement) -> None:
+    from vslam_ref.commands.tables import table
+
+    words = {-1: "below", 0: "inside", 1: "above"}
+    rows = [
+        [
+            w.name,
+            f"{w.mean:.3f}",
+            f"{w.low:.3f}",
+            f"{w.high:.3f}",
+            words[w.side],
+            f"{w.independent_steps:.1f}",
+        ]
+        for w in found.windows
+    ]
+    print(table(["window", "mean NEES", "low", "high", "mean is", "independent steps"], rows))
+    low, high = found.interval
+    print(f"all steps: {found.mean:.3f} for {found.dof}; 95 % over resampled runs: {low:.3f} to {high:.3f}")
+    print(f"an honest filter is called otherwise in about {100 * found.false_alarm:g} % of such studies")
