@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 HELP = "verify a program's formulas, signs and conventions with the conformance vectors"
 EPILOG = """\
 The program is started once. It reads one request a line and writes one reply a line, both JSON:
-  {"id": "…", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}
-  {"id": "…", "value": {"R": [[…], […], […]]}}, or
-  {"id": "…", "unsupported": true}, or {"id": "…", "error": "…"}
+  {"id": "...", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}
+  {"id": "...", "value": {"R": [[...], [...], [...]]}}, or
+  {"id": "...", "unsupported": true}, or {"id": "...", "error": "..."}
 'vslam-ref vectors list' names the functions. A program with conventions of its own says so in a JSON file:
   {"transform": "world_from_cam", "perturbation": "right", "tangent_order": "rotation_first"}
 

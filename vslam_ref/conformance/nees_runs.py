@@ -147,7 +147,7 @@ def judge(runs: Runs, false_alarm: float = FALSE_ALARM, seed: int = 0) -> Judgem
 
     Examples
     --------
-    >>> error = np.random.default_rng(1).standard_normal((40, 5, 2))
+    >>> error = np.random.default_rng(2).standard_normal((40, 5, 2))
     >>> for scale in (1.0, 0.5, 2.0):
     ...     print(judge(Runs(np.arange(5.0), error, np.tile(scale * np.eye(2), (40, 5, 1, 1)))).verdict)
     consistent
