@@ -89,9 +89,11 @@ def _outputs(
 
 
 def _prepared(kind: str, expected: Any, got: Any) -> tuple[Any, Any]:
-    """What is compared: a set in the order of the expected one, the numbers of a table's text."""
+    """What is compared: a set in the expected order, a quaternion of the expected sign, a table's numbers."""
     if kind == "poses":
         return expected, _in_order(expected, got)
+    if kind == "quaternion":
+        return expected, _same_side(expected, got)
     if kind == "table" and isinstance(expected, str) and isinstance(got, str):
         return _table(expected), _table(got)
     return expected, got
@@ -106,6 +108,18 @@ def _in_order(expected: Any, got: Any) -> Any:
     if want.ndim < 2 or len(have) != len(want) or any(member.shape != want.shape[1:] for member in have):
         return got
     return [have.pop(int(np.argmin([np.abs(member - x).max() for member in have]))) for x in want]
+
+
+def _same_side(expected: Any, got: Any) -> Any:
+    """A quaternion, or its negative where that is nearer to the expected one."""
+    try:
+        want, have = numbers(expected), numbers(got)
+    except ValueError:
+        return got
+    if want.shape != have.shape or not np.isfinite(have).all():
+        return got
+    side = np.where(np.sum(want * have, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return side * have
 
 
 def _table(text: str) -> list[list[float]] | str:

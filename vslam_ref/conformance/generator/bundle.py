@@ -97,7 +97,7 @@ def _residual(rng: np.random.Generator, model: str) -> dict[str, Any]:
     wrong = {"measured-minus-predicted": [-v for v in right]}
     back = _seen(model, k, T**-1, X)
     point = T**-1 * mpmath.matrix([*vector(X), 1])
-    if point[2] > 0.5:
+    if point[2] > 0.5 and max(abs(v) for v in back) < 2000:
         wrong["pose-inverted"] = [a - mpf(b) for a, b in zip(back, uv, strict=True)]
     inputs = {"model": model, "params": params, "pose": pose, "X_world": X, "uv": uv}
     mistakes = {note: {"r": floats(v)} for note, v in wrong.items()}

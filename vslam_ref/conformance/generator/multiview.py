@@ -100,22 +100,12 @@ def build(rng: np.random.Generator) -> Topic:
 
 def _triangulate(topic: Topic, rng: np.random.Generator) -> None:
     oracle = "the scene's own point, projected in 50 digits"
+    near = "a parallax above 0.1: eps over its square, times the depth"
+    distant = "a parallax of 0.002 to 0.01: eps over its square, times the depth"
     for flag, views, far, reason, relative in (
-        (
-            "two_views",
-            2,
-            1.0,
-            "rays with a parallax above 0.05: eps over it, and some fifty operations",
-            1e-13,
-        ),
-        (
-            "many_views",
-            5,
-            1.0,
-            "rays with a parallax above 0.05: eps over it, and some fifty operations",
-            1e-13,
-        ),
-        ("small_parallax", 2, 60.0, "a parallax of 0.001 to 0.02: eps over its square", 1e-9),
+        ("two_views", 2, 1.0, near, 1e-12),
+        ("many_views", 5, 1.0, near, 1e-12),
+        ("small_parallax", 2, 60.0, distant, 1e-6),
     ):
         rule = tolerance(relative, reason, float32=1e-2)
         cases = [_point(rng, views, far) for _ in range(10)]

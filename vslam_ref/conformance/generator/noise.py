@@ -74,7 +74,7 @@ def _statistic(measure: str, sigma: float) -> dict[str, Any]:
         # even moments of the two narrow uniform distributions are the same: only the mean tells them apart
         if measure in moments and not (note == "positive-uniform" and measure != "mean"):
             mistakes[note] = _band(*moments[measure], sigma**power)
-    if power > 1:
+    if power == 2:
         mistakes["variance-for-deviation"] = _band(mean, variance, sigma ** (2 * power))
     return {
         **{"output": "x", "measure": measure, "samples": SAMPLES},

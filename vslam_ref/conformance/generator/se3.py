@@ -26,7 +26,7 @@ from vslam_ref.conformance.generator.groups import (
 
 TOPIC, CHAPTER = "se3", 2
 SERIES = "power series of the generator, 50 digits"
-ROUNDING = "a few dozen operations on numbers of order 1, each within eps"
+ROUNDING = "a hundred operations on numbers of order 1 within eps, as in a general matrix exponential"
 
 NOTES = {
     "straight": (
@@ -65,7 +65,7 @@ def build(rng: np.random.Generator) -> Topic:
         topic.note(identity, meaning, formula)
     for flag in REGIMES:
         _regime(topic, flag, [twist(rng, flag) for _ in range(8)])
-    fine = tolerance(1e-14, ROUNDING)
+    fine = tolerance(5e-14, ROUNDING)
     zero = {"inputs": {"xi": np.zeros(6)}, "expected": {"T": np.eye(4)}}
     topic.group("se3.exp", "eq-exp-rigid", "definition", fine, [zero], flags=("zero",))
     zero = {"inputs": {"T": np.eye(4)}, "expected": {"xi": np.zeros(6)}}
@@ -94,7 +94,7 @@ def build(rng: np.random.Generator) -> Topic:
 def _regime(topic: Topic, flag: str, twists: list[Array]) -> None:
     """Exponential, logarithm and Jacobians."""
     flags = () if flag == "generic" else (flag,)
-    fine = tolerance(1e-14, ROUNDING)
+    fine = tolerance(5e-14, ROUNDING)
     topic.group("se3.exp", "eq-exp-rigid", SERIES, fine, [_exp(x) for x in twists], flags=flags)
     cases = [_left_jacobian(x, flag) for x in twists]
     topic.group("se3.left_jacobian", "eq-jacobian-rigid", SERIES, fine, cases, flags=flags)

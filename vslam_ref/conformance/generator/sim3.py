@@ -12,7 +12,7 @@ from vslam_ref.conformance.generator import exact
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact import column, floats, integrated, matrix, vector
 from vslam_ref.conformance.generator.groups import SIM3, Array, product, shift, turn
-from vslam_ref.conformance.generator.se3 import case
+from vslam_ref.conformance.generator.se3 import ROUNDING, case
 from vslam_ref.conformance.generator.so3 import log_of
 
 TOPIC, CHAPTER = "sim3", 2
@@ -47,7 +47,7 @@ def build(rng: np.random.Generator) -> Topic:
     topic = Topic(CHAPTER, TOPIC)
     for identity, (meaning, formula) in NOTES.items():
         topic.note(identity, meaning, formula)
-    fine = tolerance(1e-14, "a few dozen operations on numbers of order 1, each within eps")
+    fine = tolerance(5e-14, ROUNDING)
     for flag in REGIMES:
         flags = () if flag == "generic" else (flag,)
         twists = [_twist(rng, flag) for _ in range(8)]

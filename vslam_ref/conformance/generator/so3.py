@@ -67,7 +67,7 @@ def build(rng: np.random.Generator) -> Topic:
 def _regime(topic: Topic, flag: str, phis: list[Array]) -> None:
     """Exponential, Jacobians and logarithm at some rotation vectors."""
     flags = () if flag == "generic" else (flag,)
-    fine, pole = tolerance(1e-14, ROUNDING), tolerance(1e-13, NEAR_POLE, float32=1e-3)
+    fine, pole = tolerance(2e-14, ROUNDING), tolerance(1e-13, NEAR_POLE, float32=1e-3)
     topic.group("so3.exp", "eq-rodrigues", SERIES, fine, [_exp(p) for p in phis], flags=flags)
     cases = [_jacobian(p, flag) for p in phis]
     topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", fine, cases, flags=flags)

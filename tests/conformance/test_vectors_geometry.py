@@ -1,0 +1,173 @@
+"""Vectors of chapters 01 to 06 and 23: an independent program passes, every known mistake is told by name."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import json
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import plain_cameras
+import plain_estimates
+import plain_motions
+import plain_views
+import pytest
+from jsonschema import Draft202012Validator
+
+from vslam_ref.conformance import vectors_format as form
+from vslam_ref.conformance.adapters.table import answer_from, plain
+from vslam_ref.conformance.compare import matches
+from vslam_ref.conformance.program import InProcess
+from vslam_ref.conformance.runner import Report, run
+
+PROGRAM: dict[str, Callable[..., Any]] = {
+    **plain_motions.PROGRAM,
+    **plain_cameras.PROGRAM,
+    **plain_estimates.PROGRAM,
+    **plain_views.PROGRAM,
+}
+FILES = [name for name in form.names() if name[:2] in ("01", "02", "03", "04", "05", "06", "23")]
+
+
+@functools.cache
+def loaded(name: str) -> form.VectorFile:
+    return form.load(name)
+
+
+def listed(case: form.Case) -> list[str]:
+    """Mistakes that a case can name."""
+    return [*case.mistakes, *(case.statistic or {}).get("mistakes", {})]
+
+
+MISTAKES = sorted(
+    {(name, case.function, note) for name in FILES for case in loaded(name).cases for note in listed(case)}
+)
+
+
+def program(wrong: str | None = None) -> InProcess:
+    """The plain program, on demand with one of its mistakes."""
+    module = ModuleType("plain")
+    table = {name: functools.partial(function, wrong=wrong) for name, function in PROGRAM.items()}
+    module.answer = lambda function, inputs: answer_from(table, function, inputs)  # type: ignore[attr-defined]
+    return InProcess(module)
+
+
+def some(name: str, keep: Callable[[form.Case], bool]) -> form.VectorFile:
+    file = loaded(name)
+    return file._replace(cases=[case for case in file.cases if keep(case)])
+
+
+def failures(report: Report) -> list[str]:
+    bad = [o for o in report.outcomes if o.status != "passed"]
+    return [f"{o.case.id}: {o.status} {o.cause} {o.difference and o.difference[-2:]}" for o in bad]
+
+
+def test_all_topics_are_there() -> None:
+    topics = {name.partition("/")[2].removesuffix(".json") for name in FILES}
+    assert topics >= {
+        *("multiview", "so2", "se2", "so3", "quaternion", "se3", "sim3", "camera", "loss", "scale", "noise"),
+        *("least_squares", "bundle", "trajectory", "format"),
+    }
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_program_of_closed_formulas_passes(name: str) -> None:
+    """A second oracle: Pade for series, SVD for eigenvectors, complex steps for differences, in doubles."""
+    assert failures(run(program(), [loaded(name)])) == []
+
+
+@pytest.mark.parametrize(("name", "function", "note"), MISTAKES)
+def test_every_mistake_is_told_by_its_name(name: str, function: str, note: str) -> None:
+    """A program that computes the wrong formula, not the number that the vectors hold."""
+    file = some(name, lambda case: case.function == function and note in listed(case))
+    outcomes = run(program(note), [file]).outcomes
+    for o in outcomes:
+        assert o.status == "failed", f"{o.case.id} does not tell {note} from the right answer"
+        assert o.cause == f"{note}: {file.notes[note]['meaning']}", o.case.id
+    assert outcomes
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_note_belongs_to_a_case_and_every_topic_has_mistakes(name: str) -> None:
+    file = loaded(name)
+    used = {note for case in file.cases for note in listed(case)}
+    assert used == set(file.notes)
+    assert used
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_no_mistake_equals_another_or_the_right_answer(name: str) -> None:
+    for case in loaded(name).cases:
+        right = [case.expected, *case.accept] if case.result == "valid" else []
+        answers = [*right, *case.mistakes.values()]
+        pairs = [(a, b) for i, a in enumerate(answers) for b in answers[:i] if i >= len(right)]
+        assert not any(matches(a, b, case) for a, b in pairs), case.id
+
+
+def flipped(value: Any) -> Any:
+    """The answer with the sign of its largest number changed; a text with that of its last number."""
+    if isinstance(value, dict):
+        return {key: flipped(v) for key, v in value.items()}
+    if isinstance(value, list):
+        if value and isinstance(value[0], dict):
+            return [*value[:-1], flipped(value[-1])]
+        sizes = [_size(v) for v in value]
+        at = sizes.index(max(sizes)) if sizes else 0
+        return [flipped(v) if k == at else v for k, v in enumerate(value)]
+    if isinstance(value, str):
+        words = value.split()
+        last = str(-float(words[-1]))
+        return value.rstrip()[: -len(words[-1])] + last + "\n"
+    return value if isinstance(value, bool) else -value
+
+
+def _size(value: Any) -> float:
+    return max(map(_size, value), default=0.0) if isinstance(value, list) else abs(value)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_an_answer_with_a_flipped_sign_fails(name: str) -> None:
+    file = some(name, lambda case: case.result == "valid" and case.statistic is None)
+    answers = {case.id: flipped(copy.deepcopy(case.expected)) for case in file.cases}
+    module = ModuleType("flipped")
+    ids = iter(file.cases)
+    module.answer = lambda function, inputs: answers[next(ids).id]  # type: ignore[attr-defined]
+    passed = {o.case.id for o in run(InProcess(module), [file]).outcomes if o.status == "passed"}
+    zero = {case.id for case in file.cases if answers[case.id] == case.expected}
+    # nothing to flip: logarithms of the identity, Tukey beyond c; either is right: a half turn's axis, q or -q
+    either = {case.id for case in file.cases if case.accept and _only_one(case)}
+    assert passed - either == zero
+    assert len(zero) <= 20
+
+
+def _only_one(case: form.Case) -> bool:
+    """Whether the expected answer has a single number that is not zero, so that flipping it is its negative."""
+    (value,) = case.expected.values()
+    return sum(abs(v) > 1e-12 for v in value) == 1
+
+
+def test_there_are_enough_cases() -> None:
+    assert sum(form.counted(loaded(name).cases) for name in FILES) >= 2000
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_short_and_fit_their_schema(name: str) -> None:
+    text = (form.folder() / name).read_text(encoding="utf-8")
+    assert len(text) < 400_000
+    schema = json.loads((form.folder() / "schema.json").read_text(encoding="utf-8"))
+    assert list(Draft202012Validator(schema).iter_errors(json.loads(text))) == []
+    assert list(form.lint(loaded(name))) == []
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_library_passes(name: str) -> None:
+    report = run(InProcess("vslam_ref.conformance.adapters.itself"), [loaded(name)])
+    assert failures(report) == []
+    assert report.count("unsupported") == 0
+
+
+def test_plain_answers_are_lists() -> None:
+    """What the plain program answers is what a foreign program could send."""
+    assert plain(plain_motions.so2_exp(0.0)) == [[1.0, 0.0], [0.0, 1.0]]
