@@ -18,6 +18,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pytest
+
 from vslam_ref.conformance import vectors_format
 from vslam_ref.conformance.conventions import Convention, read
 from vslam_ref.conformance.program import Asked, InProcess, Program
@@ -59,6 +61,13 @@ def missing(name: str) -> str:
     return ""
 
 
+def need(name: str) -> None:
+    """Skip where the tool is absent."""
+    reason = missing(name)
+    if reason:
+        pytest.skip(reason)
+
+
 def other_version(name: str) -> str:
     """Why a list may not hold here: it was made with another version of the library."""
     for package, version in LISTS[name]["version"].items():
@@ -77,10 +86,9 @@ def compiler() -> str | None:
 
 
 @functools.cache
-def compiled() -> str:
-    """Compile the C++ adapter once, all warnings on and none allowed."""
-    folder = Path(WORK.name)
-    source = (FOLDER / "cpp" / "adapter.cpp").read_text("utf-8")
+def compiled(source: str) -> str:
+    """Compile a C++ program once, all warnings on and none allowed."""
+    folder = Path(tempfile.mkdtemp(dir=WORK.name))
     (folder / "adapter.cpp").write_text(source, encoding="utf-8")
     command = compiler()
     assert command is not None
@@ -93,7 +101,7 @@ def compiled() -> str:
 def asked(name: str) -> Asked:
     """The adapter, ready to answer."""
     if name == "cpp":
-        return Program(compiled(), 60.0)
+        return Program(compiled((FOLDER / "cpp" / "adapter.cpp").read_text("utf-8")), 60.0)
     if name == "node":
         return Program(f"node '{FOLDER / 'node' / 'adapter.mjs'}'", 60.0)
     return InProcess(f"{PACKAGE}.{name if name.endswith('_usual') else f'{name}_adapter'}")

@@ -21,13 +21,6 @@ from vslam_ref.conformance.runner import Report, run
 AT_LEAST_EIGHT = ("opencv", "scipy", "gtsam", "cpp", "node")
 
 
-def need(name: str) -> None:
-    """Skip where the tool is absent."""
-    reason = lists.missing(name)
-    if reason:
-        pytest.skip(reason)
-
-
 def judge(name: str, report: Report) -> None:
     """Compare a run with the adapter's list."""
     listed = lists.listed(name)
@@ -46,7 +39,7 @@ def judge(name: str, report: Report) -> None:
 @pytest.mark.parametrize("name", lists.NAMES)
 def test_deviations_are_exactly_those_listed(name: str) -> None:
     """A case that fails and is not listed is new; a listed one that passes was mended."""
-    need(name)
+    lists.need(name)
     if lists.other_version(name):
         pytest.skip(lists.other_version(name))
     entry = lists.LISTS[name]
@@ -59,7 +52,7 @@ def test_deviations_are_exactly_those_listed(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in lists.NAMES if "every" in lists.LISTS[name]])
 def test_all_cases_of_the_slow_ones(name: str) -> None:
-    need(name)
+    lists.need(name)
     if lists.other_version(name):
         pytest.skip(lists.other_version(name))
     judge(name, lists.verified(name, lists.chosen()))
@@ -103,7 +96,7 @@ def test_the_lists_name_cases_that_exist_and_say_why() -> None:
 )
 def test_without_one_declaration_a_right_program_fails(name: str, key: str, topics: set[str]) -> None:
     """In every topic that the convention touches, and only because of it."""
-    need(name)
+    lists.need(name)
     house = getattr(Convention(), key)
     assert getattr(lists.convention(name), key) != house
     less = dataclasses.replace(lists.convention(name), **{key: house})
@@ -116,7 +109,7 @@ def test_without_one_declaration_a_right_program_fails(name: str, key: str, topi
 
 def test_an_undeclared_order_is_diagnosed() -> None:
     """GTSAM's logarithm, read as ours, is told to have the rotation first."""
-    need("gtsam")
+    lists.need("gtsam")
     report = lists.verified("gtsam", lists.chosen(4, {"se3"}), Convention())
     causes = {o.cause for o in report.outcomes if o.case.function == "se3.log" and o.status == "failed"}
     assert any("rotation" in cause for cause in causes)
@@ -144,7 +137,7 @@ WRONG_SCRIPTS = [
 
 @pytest.mark.parametrize(("right", "wrong", "function"), WRONG_SCRIPTS)
 def test_one_wrong_sign_in_the_script_is_found(right: str, wrong: str, function: str, tmp_path: Path) -> None:
-    need("node")
+    lists.need("node")
     source = (lists.FOLDER / "node" / "adapter.mjs").read_text("utf-8")
     assert right in source, right
     (tmp_path / "wrong.mjs").write_text(source.replace(right, wrong), encoding="utf-8")
@@ -181,7 +174,7 @@ def test_programs_survive_strange_lines(name: str) -> None:
     """One reply to each line but blank ones, in order, with its id."""
     command = [sys.executable, "-m", "vslam_ref.conformance.serve", f"{lists.PACKAGE}.scipy_adapter"]
     if name != "serve":
-        need(name)
+        lists.need(name)
         asked = lists.asked(name)
         assert isinstance(asked, Program)
         asked.close()
@@ -236,7 +229,7 @@ def test_serve_wants_one_module_with_an_answer(
 
 def test_numbers_keep_their_digits() -> None:
     """The C++ reader and writer give back every bit: the identity times a matrix of awkward numbers."""
-    need("cpp")
+    lists.need("cpp")
     awkward = [
         [0.1, 1e-300, 1.7976931348623157e308],
         [5e-324, -0.1, 1.0 / 3.0],

@@ -1,4 +1,4 @@
-// An adapter in C++17, one file, no dependencies: copy it and put your own functions into the table at the end.
+// An adapter in C++17: one file, no dependencies: copy it and put your own functions into the table at the end.
 //
 //     g++ -std=c++17 -O2 -o adapter adapter.cpp
 //     vslam-ref verify --program ./adapter
@@ -8,10 +8,12 @@
 //     {"id": "so3.exp/generic-01", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}
 //     {"id": "so3.exp/generic-01", "value": {"R": [[...], [...], [...]]}}
 //
-// or {"id": ..., "unsupported": true}, or {"id": ..., "error": "why"}.  Nothing else may go to standard output.
+// or {"id": ..., "unsupported": true}, or {"id": ..., "error": "why"}.  Nothing else may go to standard
+// output.
 // Compile without -ffast-math: it breaks what is not finite.
 //
-//   1 JSON    2 matrices    3 groups    4 cameras    5 losses, steps    6 filters    7 grids, files    8 the table
+//   1 JSON   2 matrices   3 between the two   4 groups   5 cameras   6 losses and steps   7 filters
+//   8 grids, trajectories, files   9 the table.  Yours are 4 to 9; keep the rest, and main().
 
 #include <algorithm>
 #include <array>
@@ -381,7 +383,49 @@ Vec least_squares(Mat A, Vec b) {  // Householder reflections; refuses a rank th
   return x;
 }
 
-// ---------------------------------------------------------------- 3 groups
+// ------------------------------------------------- 3 between the two of them
+
+// From JSON: v a vector, m a matrix, x a number, s a word.  To JSON: to().
+double x(const Json& j) {
+  if (j.kind == Json::Number || j.kind == Json::Bool) return j.number;
+  if (j.kind == Json::String && j.text == "nan") return std::numeric_limits<double>::quiet_NaN();
+  if (j.kind == Json::String && j.text == "inf") return std::numeric_limits<double>::infinity();
+  if (j.kind == Json::String && j.text == "-inf") return -std::numeric_limits<double>::infinity();
+  throw std::runtime_error("expected a number");
+}
+Vec v(const Json& j) {
+  if (j.kind != Json::Array) throw std::runtime_error("expected a list");
+  Vec out;
+  for (const Json& item : j.items) out.push_back(x(item));
+  return out;
+}
+Mat m(const Json& j) {
+  Mat M(static_cast<int>(j.items.size()), j.items.empty() ? 0 : static_cast<int>(j.items[0].items.size()));
+  for (int i = 0; i < M.rows; ++i) {
+    const Vec row = v(j.items[static_cast<size_t>(i)]);
+    if (static_cast<int>(row.size()) != M.cols) throw std::runtime_error("rows of different lengths");
+    for (int k = 0; k < M.cols; ++k) M(i, k) = row[static_cast<size_t>(k)];
+  }
+  return M;
+}
+std::string s(const Json& j) { return j.text; }
+
+Json to(double value) { return Json(value); }
+Json to(const Json& j) { return j; }
+Json to(const Vec& values) {
+  Json j = Json::array();
+  for (const double value : values) j.items.push_back(Json(value));
+  return j;
+}
+Json to(const Mat& M) {
+  Json j = Json::array();
+  for (int i = 0; i < M.rows; ++i) j.items.push_back(to(block(M, i, 0, 1, M.cols).a));
+  return j;
+}
+
+#define ANSWER(expression) [](const Json& in) -> Json { return to(expression); }
+
+// ---------------------------------------------------------------- 4 groups
 
 const double PI = 3.14159265358979323846;
 
@@ -581,7 +625,7 @@ Mat se2_ad(const Vec& xi) {
   return A;
 }
 
-// --------------------------------------------------------------- 4 cameras
+// --------------------------------------------------------------- 5 cameras
 
 // A number with its derivatives: every Jacobian of the cameras comes from the one function project().
 struct Dual {
@@ -772,7 +816,7 @@ Vec camera_unproject(const std::string& model, const Vec& p, const Vec& uv) {  /
   return (1.0 / norm({x, y, 1.0})) * Vec{x, y, 1.0};
 }
 
-// ------------------------------------------------------- 5 losses and steps
+// ------------------------------------------------------- 6 losses and steps
 
 double loss(const std::string& name, double c, double x, char what) {  // c: cost, i: influence, w: weight
   const double u = (x / c) * (x / c), a = std::abs(x);
@@ -806,7 +850,7 @@ Vec damped_step(const Mat& J, const Vec& r, double damping, const Vec& scale) {
   return least_squares(A, b);
 }
 
-// --------------------------------------------------------------- 6 filters
+// --------------------------------------------------------------- 7 filters
 
 struct State {
   Vec x;
@@ -864,7 +908,7 @@ State augment(State s, const Vec& z, const Mat& cov_z) {
   return {s.x, P};
 }
 
-// ----------------------------------------------- 7 grids, trajectories, files
+// ----------------------------------------------- 8 grids, trajectories, files
 
 Json ray_cells(const Vec& from, const Vec& to) {  // the segment is cut at every grid line it crosses
   Vec cuts{0.0, 1.0};
@@ -909,45 +953,8 @@ std::vector<Vec> table_of(const std::string& text, size_t columns) {
   return rows;
 }
 
-// ------------------------------------------------------------- 8 the table
+// ------------------------------------------------------------- 9 the table
 
-// From JSON: v a vector, m a matrix, x a number, s a word.  To JSON: to().
-double x(const Json& j) {
-  if (j.kind == Json::Number || j.kind == Json::Bool) return j.number;
-  if (j.kind == Json::String && j.text == "nan") return std::numeric_limits<double>::quiet_NaN();
-  if (j.kind == Json::String && j.text == "inf") return std::numeric_limits<double>::infinity();
-  if (j.kind == Json::String && j.text == "-inf") return -std::numeric_limits<double>::infinity();
-  throw std::runtime_error("expected a number");
-}
-Vec v(const Json& j) {
-  if (j.kind != Json::Array) throw std::runtime_error("expected a list");
-  Vec out;
-  for (const Json& item : j.items) out.push_back(x(item));
-  return out;
-}
-Mat m(const Json& j) {
-  Mat M(static_cast<int>(j.items.size()), j.items.empty() ? 0 : static_cast<int>(j.items[0].items.size()));
-  for (int i = 0; i < M.rows; ++i) {
-    const Vec row = v(j.items[static_cast<size_t>(i)]);
-    if (static_cast<int>(row.size()) != M.cols) throw std::runtime_error("rows of different lengths");
-    for (int k = 0; k < M.cols; ++k) M(i, k) = row[static_cast<size_t>(k)];
-  }
-  return M;
-}
-std::string s(const Json& j) { return j.text; }
-
-Json to(double value) { return Json(value); }
-Json to(const Json& j) { return j; }
-Json to(const Vec& values) {
-  Json j = Json::array();
-  for (const double value : values) j.items.push_back(Json(value));
-  return j;
-}
-Json to(const Mat& M) {
-  Json j = Json::array();
-  for (int i = 0; i < M.rows; ++i) j.items.push_back(to(block(M, i, 0, 1, M.cols).a));
-  return j;
-}
 Json to(const State& state) { return Json::object({{"x", to(state.x)}, {"P", to(state.P)}}); }
 
 State state(const Json& in) { return {v(in["x"]), m(in["P"])}; }
@@ -1076,8 +1083,6 @@ double log_odds(double p) {
   if (!(p >= 0.0 && p <= 1.0)) throw std::runtime_error("a probability lies between 0 and 1");
   return std::log(p) - std::log1p(-p);
 }
-
-#define ANSWER(expression) [](const Json& in) -> Json { return to(expression); }
 
 const std::map<std::string, std::function<Json(const Json&)>> TABLE = {
     {"so2.exp", ANSWER(so2_exp(x(in["angle"])))},
