@@ -136,14 +136,14 @@ def test_an_answer_with_a_flipped_sign_fails(name: str) -> None:
     module.answer = lambda function, inputs: answers[next(ids).id]  # type: ignore[attr-defined]
     passed = {o.case.id for o in run(InProcess(module), [file]).outcomes if o.status == "passed"}
     zero = {case.id for case in file.cases if answers[case.id] == case.expected}
-    # nothing to flip: logarithms of the identity, Tukey beyond c; either is right: a half turn's axis, q or -q
+    # zero is nothing to flip (the identity's logarithm, Tukey beyond c); of an axis or q both ends are right
     either = {case.id for case in file.cases if case.accept and _only_one(case)}
     assert passed - either == zero
     assert len(zero) <= 20
 
 
 def _only_one(case: form.Case) -> bool:
-    """Whether the expected answer has a single number that is not zero, so that flipping it is its negative."""
+    """Whether one number alone is not zero, so that flipping it is the whole answer's negative."""
     (value,) = case.expected.values()
     return sum(abs(v) > 1e-12 for v in value) == 1
 
