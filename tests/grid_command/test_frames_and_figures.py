@@ -1,4 +1,4 @@
-"""Pictures of maps: north is up, colours lie where they belong, shrinking keeps walls; figures have labels."""
+"""Pictures of maps: north is up, colours lie where they belong, shrinking keeps walls; figures are labelled."""
 
 from __future__ import annotations
 
