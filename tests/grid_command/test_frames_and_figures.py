@@ -1,4 +1,4 @@
-"""Pictures of maps: north is up, colours lie where they belong, shrinking keeps walls; figures are labelled."""
+"""Pictures of maps: north is up, colours lie where they belong, walls stay when shrunk; labels."""
 
 from __future__ import annotations
 
