@@ -31,7 +31,7 @@ NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?")
 
 
 def assert_same(there: str, made: str) -> None:
-    """Equal but for last digits: inputs are drawn with NumPy's sine and logarithm, which differ by machine."""
+    """Equal but for last digits: inputs are drawn with NumPy's sine and logarithm; machines differ."""
     assert NUMBER.sub("n", there) == NUMBER.sub("n", made)
     a, b = (np.array([float(n) for n in NUMBER.findall(text)]) for text in (there, made))
     assert np.allclose(a, b, rtol=1e-9, atol=1e-14)
