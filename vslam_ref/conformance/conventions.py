@@ -18,7 +18,8 @@ T_world_cam         right         (T^-1 Exp(eta))^-1         -eta
 T_world_cam         left          (Exp(eta) T^-1)^-1         -Ad_T eta
 ==================  ============  =========================  =================
 
-With xi = M eta, a Jacobian is J_program = J M, and a covariance M P_program M^T = P.
+With xi = M eta, a Jacobian is J_program = J M, and a covariance M P_program M^T = P
+(:eq:`eq-convention-tangent` and the two after it, chapter 24).
 """
 
 from __future__ import annotations
@@ -78,7 +79,10 @@ class Convention:
         return {name: self._home(kind, outputs[name], inputs) for name, kind in known.items()}
 
     def _out(self, kind: str, value: Any, inputs: Mapping[str, Any]) -> Any:
-        """One quantity, from the house's form to the program's."""
+        """One quantity, from the house's form to the program's.
+
+        Implements :eq:`eq-convention-jacobian` and :eq:`eq-convention-covariance`.
+        """
         if self._unchanged(kind):
             return value
         x = numbers(value)
@@ -104,7 +108,10 @@ class Convention:
         return (back @ x @ np.swapaxes(back, -1, -2))[..., order, :][..., order].tolist()
 
     def _home(self, kind: str, value: Any, inputs: Mapping[str, Any]) -> Any:
-        """One quantity, from the program's form to the house's."""
+        """One quantity, from the program's form to the house's.
+
+        Implements :eq:`eq-convention-jacobian` and :eq:`eq-convention-covariance`.
+        """
         if self._unchanged(kind):
             return value
         x = numbers(value)
@@ -151,7 +158,10 @@ class Convention:
         return ROTATION_FIRST_SIM3 if kind.endswith("sim3") else ROTATION_FIRST
 
     def _from_program(self, inputs: Mapping[str, Any]) -> Array:
-        """M with xi = M eta, translations first in both."""
+        """M with xi = M eta, translations first in both.
+
+        Implements :eq:`eq-convention-tangent`.
+        """
         away = self.transform == "world_from_cam"
         turned = (self.perturbation == "right") != away
         M = se3.adjoint(numbers(inputs["pose"])) if turned else np.eye(6)
