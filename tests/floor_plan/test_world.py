@@ -226,10 +226,13 @@ def test_a_wall_in_the_way_is_refused() -> None:
     [
         (lambda: CrowdConfig(density=0.6), "density=0.6"),
         (lambda: CrowdConfig(density=float("nan")), "density=nan"),
+        (lambda: CrowdConfig(pause_most=float("nan")), "pause_most=nan"),
+        (lambda: RobotConfig(turn_rate=float("inf")), "turn_rate=inf"),
+        (lambda: FloorPlanConfig(memory=float("nan")), "memory=nan"),
         (lambda: CrowdConfig(leg_swing=0.3), "legs must stay inside"),
         (lambda: CrowdConfig(step=0.0), "finite numbers > 0"),
         (lambda: LaserConfig(beams=1), "beams=1"),
-        (lambda: LaserConfig(max_range=float("inf")), "finite max_range"),
+        (lambda: LaserConfig(max_range=float("inf")), "max_range=inf"),
         (lambda: LaserConfig(field_of_view=7.0), "2 pi"),
         (lambda: RobotConfig(speed=0.0), "numbers > 0"),
         (lambda: RobotConfig(drift_ds=-1.0), ">= 0"),
@@ -262,3 +265,19 @@ def test_poses_and_segments_share_one_world(hall_run: Recording) -> None:
     ).any(axis=1)
     on_wall = hall_run.owner[k] == 0
     assert on[on_wall].mean() > 0.7  # the others lie on the pillar
+
+
+def test_rasters_and_floors_that_cannot_be_are_refused(hall_run: Recording) -> None:
+    from vslam_ref.worlds.floor_plan import disc_cells
+
+    for resolution in (0.0, -0.1, float("nan")):
+        with pytest.raises(ValueError, match="resolution="):
+            cover(hall_run, resolution=resolution)
+    with pytest.raises(ValueError, match="discs"):
+        disc_cells(cover(hall_run), [[np.nan, 0.0, 1.0]])
+    full = dataclasses.replace(hall(), zones=np.array([[4.1, 3.1, 4.5, 3.5]]))  # the pillar fills it
+    with pytest.raises(ValueError, match="free area"):
+        Crowd(full, CrowdConfig(), 0.0, np.random.default_rng(1))
+    ledge = dataclasses.replace(hall(), furniture=(), things=(), zones=np.array([[0.05, 0.05, 6.05, 0.1]]))
+    with pytest.raises(ValueError, match="find no place"):
+        Crowd(ledge, CrowdConfig(density=0.5), 0.0, np.random.default_rng(1))

@@ -127,6 +127,8 @@ def disc_cells(cells: Cells, discs: ArrayLike) -> BoolArray:
     """
     cells = checked_cells(cells)
     raster = np.zeros(cells.shape, dtype=bool)
+    if not np.isfinite(np.asarray(discs, dtype=np.float64)).all():
+        raise ValueError("discs: need finite places and radii")
     for x, y, r in (
         np.asarray(discs, dtype=np.float64).reshape(-1, 3) - [*cells.origin_xy, 0.0]
     ) / cells.resolution:

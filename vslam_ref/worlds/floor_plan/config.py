@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -10,6 +10,14 @@ import numpy as np
 
 def _assume(default: Any, unit: str, reason: str) -> Any:
     return field(default=default, metadata={"unit": unit, "reason": reason})
+
+
+def _refuse_not_finite(config: Any) -> None:
+    """Raise for a number of the config that is NaN or infinite: comparisons would let NaN through."""
+    for f in fields(config):
+        value = getattr(config, f.name)
+        if isinstance(value, float) and not np.isfinite(value):
+            raise ValueError(f"{f.name}={value}: need a finite number")
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,7 @@ class CrowdConfig:
 
     def __post_init__(self) -> None:
         """Refuse crowds that cannot be."""
+        _refuse_not_finite(self)
         if not 0.0 <= self.density <= 0.5:
             raise ValueError(
                 f"density={self.density}: need 0 to 0.5 of the free floor; discs thrown at random jam above"
@@ -73,6 +82,7 @@ class LaserConfig:
 
     def __post_init__(self) -> None:
         """Refuse lasers that cannot be."""
+        _refuse_not_finite(self)
         if self.beams < 2:
             raise ValueError(f"beams={self.beams}: need at least 2")
         if not 0.0 < self.field_of_view <= 2 * np.pi:
@@ -105,6 +115,7 @@ class RobotConfig:
 
     def __post_init__(self) -> None:
         """Refuse robots that cannot be."""
+        _refuse_not_finite(self)
         if not (min(self.radius, self.speed, self.turn_rate, self.scan_period) > 0):
             raise ValueError("radius, speed, turn_rate and scan_period: need numbers > 0")
         if min(self.drift_ds, self.drift_turn, self.drift_heading) < 0:
@@ -132,5 +143,6 @@ class FloorPlanConfig:
 
     def __post_init__(self) -> None:
         """Refuse floors that cannot be."""
+        _refuse_not_finite(self)
         if self.memory <= 0 or self.moved_least < 0 or self.carts < 0 or self.duration <= 0:
             raise ValueError("need memory > 0, moved_least >= 0, carts >= 0 and duration > 0")

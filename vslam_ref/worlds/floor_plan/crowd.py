@@ -72,6 +72,10 @@ class Crowd:
 
     def __init__(self, plan: FloorPlan, config: CrowdConfig, start: float, rng: np.random.Generator) -> None:
         self._plan, self._config, self._rng = plan, config, rng
+        if plan.free_area <= 0:
+            raise ValueError(
+                f"plan: free area {plan.free_area:.2f} m^2: furniture covers more than the zones"
+            )
         n = round(config.density * plan.free_area / (np.pi * config.radius**2))
         self.position = self._places(n, start)
         self.velocity = np.zeros((n, 2))
@@ -94,7 +98,9 @@ class Crowd:
         segments = np.concatenate([self._plan.fixed, self._plan.moved(t)])
         boxes = np.array([b.corners(t)[[0, 2]].ravel() for b in self._plan.furniture + self._plan.things])
         found = np.zeros((0, 2))
-        while len(found) < n:
+        for _ in range(200):
+            if len(found) >= n:
+                return found[:n]
             zone = self._rng.choice(len(zones), size=2 * n, p=area / area.sum())
             share = self._rng.uniform(size=(2 * n, 2))
             places = zones[zone, :2] + share * (zones[zone, 2:] - zones[zone, :2])
@@ -103,7 +109,7 @@ class Crowd:
                 x, y = places.T
                 clear &= ~((x > low_x) & (x < high_x) & (y > low_y) & (y < high_y))
             found = np.concatenate([found, places[clear]])
-        return found[:n]
+        raise ValueError(f"plan: {n} people find no place clear of walls and boxes in its zones")
 
     def zone_of(self, points: Array) -> IntArray:
         """Index of the zone in which each point lies; 0 if it lies in none."""

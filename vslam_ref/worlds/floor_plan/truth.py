@@ -47,6 +47,8 @@ class Seen(NamedTuple):
 
 def cover(recording: Recording, margin: float = 0.5, resolution: float = 0.1) -> Cells:
     """Raster that covers the whole floor with a margin; its origin is a whole number of cells from (0, 0)."""
+    if not (np.isfinite([margin, resolution]).all() and margin >= 0 and resolution > 0):
+        raise ValueError(f"margin={margin}, resolution={resolution}: need finite metres, >= 0 and > 0")
     ends = recording.segments.reshape(-1, 2)
     low = np.floor((ends.min(axis=0) - margin) / resolution) * resolution
     high = np.ceil((ends.max(axis=0) + margin) / resolution) * resolution
