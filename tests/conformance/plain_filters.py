@@ -56,6 +56,22 @@ def front_wheel(x: Any, control: Any, wheelbase: float, dt: float, wrong: str = 
     return {"x": [px + V * dt * np.cos(th + G), py + V * dt * np.sin(th + G), heading]}
 
 
+def turn(angle: float) -> Array:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def relative(x: Any, landmark: Any, wrong: str = "") -> Answer:
+    x, landmark = arrays(x, landmark)
+    d = landmark - x[:2]
+    return {"z": {"not-turned": d, "transposed-rotation": turn(x[2]) @ d}.get(wrong, turn(-x[2]) @ d)}
+
+
+def place(x: Any, z: Any, wrong: str = "") -> Answer:
+    x, z = arrays(x, z)
+    moved = {"not-turned": z, "transposed-rotation": turn(-x[2]) @ z}.get(wrong, turn(x[2]) @ z)
+    return {"landmark": x[:2] + moved}
+
+
 # -- EKF-SLAM ----------------------------------------------------------------------------------------
 
 
@@ -181,4 +197,67 @@ def trace(
         if k == spoiled:
             state["P"][0, 0] *= 1.001
         steps.append({key: np.array(value).tolist() for key, value in state.items()})
+    return {"steps": steps}
+
+
+def anchored_trace(x: Any, P: Any, wrong: str = "", spoiled: int = -1, **run: Any) -> Answer:
+    x, P = arrays(x, P)
+    steps = []
+    c, s = np.cos(x[2]), np.sin(x[2])
+    for local in trace(np.zeros(3), np.zeros((3, 3)), spoiled=spoiled, **run)["steps"]:
+        (a, b, angle), own = local["x"][:3], np.array(local["P"])[:3, :3]
+        J0 = np.array([[1, 0, -s * a - c * b], [0, 1, c * a - s * b], [0, 0, 1]])
+        J = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        first = P if wrong == "start-not-carried" else J0 @ P @ J0.T
+        second = own if wrong == "own-not-turned" else J @ own @ J.T
+        pose = [x[0] + c * a - s * b, x[1] + s * a + c * b, wrap(x[2] + angle)]
+        steps.append({"x": pose, "P": (first + second).tolist()})
+    return {"steps": steps}
+
+
+def ideal_trace(
+    x: Any, P: Any, wheelbase: float, dt: float, controls: Any, cov_u: Any, sightings: Any, cov_z: Any,
+    truth: Any, landmarks: Any, spoiled: int = -1,
+) -> Answer:  # fmt: skip
+    """As one linear Kalman filter on the errors, with F, G, H typed in at the truth."""
+    x, P, cov_u, cov_z, truth, landmarks = arrays(x, P, cov_u, cov_z, truth, landmarks)
+    order: list[int] = []
+    steps = []
+    for k, ((v, phi), seen) in enumerate(zip(controls, sightings, strict=True)):
+        (hx, hy, ht), (tx, ty, tt), n = truth[k], truth[k + 1], len(x)
+        t = np.tan(phi)
+        D = np.array([[dt, 0], [dt * t / wheelbase, v * dt * (1 + t * t) / wheelbase]])
+        F, G = np.eye(n), np.zeros((n, 2))
+        ds = (tx - hx) * np.cos(ht) + (ty - hy) * np.sin(ht)
+        F[:2, 2] = -ds * np.sin(ht), ds * np.cos(ht)
+        G[:3] = [[np.cos(ht), 0], [np.sin(ht), 0], [0, 1]]
+        x[:3] += v * dt * np.cos(x[2]), v * dt * np.sin(x[2]), v * dt * t / wheelbase
+        P = F @ P @ F.T + G @ D @ cov_u @ D.T @ G.T
+        both = list(zip(seen["ids"], map(np.array, seen["z"]), strict=True))
+        H, nu = [], []
+        for i, z in both:
+            if i in order:
+                at = 3 + 2 * order.index(i)
+                row, r = np.zeros((2, n)), turn(-tt) @ (landmarks[i] - [tx, ty])
+                row[:, :2], row[:, 2], row[:, at : at + 2] = -turn(-tt), [r[1], -r[0]], turn(-tt)
+                H.append(row)
+                nu.append(z - turn(-x[2]) @ (x[at : at + 2] - x[:2]))
+        if H:
+            A = np.vstack(H)
+            S = A @ P @ A.T + block_diag(*[cov_z] * len(H))
+            K = np.linalg.solve(S, A @ P).T
+            x, P = x + K @ np.concatenate(nu), P - K @ S @ K.T
+        x[2] = wrap(x[2])
+        for i, z in both:
+            if i not in order:
+                order.append(i)
+                d = landmarks[i] - [tx, ty]
+                J = np.zeros((2, len(x)))
+                J[:, :2], J[:, 2] = np.eye(2), [-d[1], d[0]]
+                own = J @ P @ J.T + turn(tt) @ cov_z @ turn(tt).T
+                P = np.block([[P, P @ J.T], [J @ P, own]])
+                x = np.concatenate([x, x[:2] + turn(x[2]) @ z])
+        if k == spoiled:
+            P[0, 0] *= 1.001
+        steps.append({"x": x[:3].tolist(), "P": P[:3, :3].tolist()})
     return {"steps": steps}

@@ -156,6 +156,31 @@ def static_dynamic(
     return {"s": new_s, "d": new_d}
 
 
+def history(
+    times: Any, observations: Any, d_lifetime: float, settle_seconds: float, hit_gap: float, most: Any,
+    wrong: str = "", **rules: Any,
+) -> Answer:  # fmt: skip
+    s = d = 0.0
+    looked, stay, last_hit, out = -np.inf, -1.0, -np.inf, []
+    for now, what in zip(times, observations, strict=True):
+        if now - looked > d_lifetime and wrong != "d-never-stale":
+            d = 0.0
+        if what == "hit":
+            there = 0.0 if stay < 0 else stay + now - looked
+            if stay >= 0 and now - looked > hit_gap and wrong != "unseen-time-counts":
+                there = stay
+            stay, last_hit = there, now
+            if s < -np.log(9) and stay >= settle_seconds and wrong != "never-settles":
+                s = 0.0
+        elif stay >= 0:
+            left = now - last_hit > hit_gap and wrong != "stay-never-ends"
+            stay = -1.0 if left else stay + now - looked
+        s, d = static_dynamic(s, d, what, most=most, **rules).values()
+        looked = now
+        out.append((s, d))
+    return {"s": [a for a, _ in out], "d": [b for _, b in out]}
+
+
 def ray_cells(start: Any, end: Any, wrong: str = "") -> Answer:
     """Clip the segment with every cell of its bounding box."""
     a, b = [Fraction(v) for v in start], [Fraction(v) for v in end]

@@ -196,3 +196,109 @@ def trace(
             P[0, 0] *= 1.001
         steps.append({key: np.array(value).tolist() for key, value in pose(Z[:4], P[:4, :4]).items()})
     return {"steps": steps}
+
+
+def landmark(x: Any, landmark: Any, wrong: str = "") -> Answer:
+    (_, _, angle), (X, Y) = x, landmark
+    s, c = np.sin(angle), np.cos(angle)
+    if wrong == "cos-before-sin":
+        s, c = c, s
+    return {"Z": [X, Y, s * X, c * X, s * Y, c * Y]}
+
+
+# -- exact moments, by quadrature --------------------------------------------------------------------
+
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(24)
+
+
+def quadrature(function: Any, mean: Array, cov: Array) -> tuple[Array, Array]:
+    """Mean and covariance of a function of a Gaussian, by Gauss and Hermite with 24 points in each direction.
+
+    For exp(i k theta), k up to 4, and a standard deviation of 0.5 the error of 24 points is below 1e-16.
+    The covariance is that of what is left after the value at the mean is taken off.
+    """
+    values, vectors = np.linalg.eigh(cov)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    axes = np.meshgrid(*[_NODES] * len(mean), indexing="ij")
+    at = mean + np.stack([a.ravel() for a in axes], -1) @ root.T
+    weights = np.ones(1)
+    for _ in mean:
+        weights = np.outer(weights, _WEIGHTS / _WEIGHTS.sum()).ravel()
+    centre = function(mean[None])[0]
+    off = function(at) - centre
+    first = weights @ off
+    second = (off * weights[:, None]).T @ off - np.outer(first, first)
+    return centre + first, second
+
+
+def _products(p: Array) -> Array:
+    x, y, s, c = p[:, 0], p[:, 1], np.sin(p[:, 2]), np.cos(p[:, 2])
+    return np.stack([x, y, s, c, s * s, c * c, x * s, x * c, y * s, y * c, s * c], -1)
+
+
+def gaussian(x: Any, P: Any, wrong: str = "") -> Answer:
+    if wrong == "first-order":
+        return vehicle(x, P)
+    Z, P_Z = quadrature(_products, *arrays(x, P))
+    return {"Z": Z, "P_Z": P_Z}
+
+
+def start(x: Any, P: Any, wrong: str = "") -> Answer:
+    Z, P_Z = gaussian(x, P, wrong).values()
+    return {"m": Z[:4], "P": P_Z[:4, :4]}
+
+
+def _control_moments(increment: Array, cov: Array, wrong: str) -> tuple[Array, Array]:
+    """Of u1, u2, u3, u2 u2, u2 u3, u3 u3, u1 u2, u1 u3."""
+
+    def monomials(u: Array) -> Array:
+        d, s, c = u[:, 0], np.sin(u[:, 1]), np.cos(u[:, 1])
+        return np.stack([d, s, c, s * s, s * c, c * c, d * s, d * c], -1)
+
+    w, C = quadrature(monomials, increment, cov)
+    if wrong == "product-of-means":
+        d, s, c = w[:3]
+        w = np.array([d, s, c, s * s, s * c, c * c, d * s, d * c])
+    return w, C
+
+
+def gaussian_predict(Z: Any, P: Any, increment: Any, cov: Any, wrong: str = "") -> Answer:
+    """B16 and B18 are linear in the monomials: their coefficients are differences of what U gives."""
+    Z, P, increment, cov = arrays(Z, P, increment, cov)
+    n = (len(Z) - 11) // 6
+    w, C = _control_moments(increment, cov, wrong)
+
+    def whole(u1: float, u2: float, u3: float) -> Array:
+        M_L = block_diag(np.eye(2), [[u3, u2], [-u2, u3]], [[u3, u2], [-u2, u3]])
+        return np.asarray(block_diag(rows(u1, u2, u3), *[M_L] * n))
+
+    M0 = whole(0, 0, 0)
+    one = [whole(*u) - M0 for u in np.eye(3)]
+    minus = [whole(*-u) - M0 for u in np.eye(3)]
+    linear = [(a - b) / 2 for a, b in zip(one, minus, strict=True)]
+    square = [(a + b) / 2 for a, b in zip(one, minus, strict=True)]
+
+    def mixed(i: int, j: int) -> Array:
+        return np.asarray(whole(*(np.eye(3)[i] + np.eye(3)[j])) - M0 - one[i] - one[j])
+
+    parts = [*linear, square[1], mixed(1, 2), square[2], mixed(0, 1), mixed(0, 2)]
+    M = M0 + sum(value * part for value, part in zip(w, parts, strict=True))
+    J = np.stack([part @ Z for part in parts], 1)
+    return {"Z": M @ Z, "P": M @ P @ M.T + J @ C @ J.T}
+
+
+def reduced_gaussian_predict(m: Any, P: Any, increment: Any, cov: Any, wrong: str = "") -> Answer:
+    m, P, increment, cov = arrays(m, P, increment, cov)
+    w, C = _control_moments(increment, cov, wrong)
+    used = [0, 1, 2, 6, 7]
+    (d, s, c, ds, dc), C = w[used], C[np.ix_(used, used)]
+    n = (len(m) - 4) // 2
+    own = np.array([[1, 0, 0, d], [0, 1, d, 0], [0, 0, c, s], [0, 0, -s, c]])
+    M = block_diag(own, *[[[c, s], [-s, c]]] * n)
+    J = np.zeros((len(m), 5))
+    J[:4, :3] = [[m[3], 0, 0], [m[2], 0, 0], [0, m[3], m[2]], [0, -m[2], m[3]]]
+    after = M @ m
+    for k in range(4, len(m), 2):
+        J[k], J[k + 1] = [0, m[k + 1], m[k], 0, -1], [0, -m[k], m[k + 1], 1, 0]
+        after[k : k + 2] += [-dc, ds]
+    return {"m": after, "P": M @ P @ M.T + J @ C @ J.T}

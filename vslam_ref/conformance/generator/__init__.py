@@ -18,6 +18,7 @@ HELPERS = (
     "exact_arrays",
     "exact_ekf",
     "exact_lift",
+    "exact_moments",
     "exact_quantiles",
     "exact_rays",
     "random_answers",

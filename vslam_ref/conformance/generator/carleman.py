@@ -11,7 +11,7 @@ from vslam_ref.conformance.generator import exact_lift
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.ekf import case, some, trace_case
 from vslam_ref.conformance.generator.exact_arrays import big
-from vslam_ref.conformance.generator.world import covariance, drive, increment, random_pose
+from vslam_ref.conformance.generator.world import covariance, drive, increment, lifted_state
 
 TOPIC, CHAPTER = "carleman", 16
 Array = NDArray[np.float64]
@@ -74,18 +74,6 @@ def build(rng: np.random.Generator) -> Topic:
     return topic
 
 
-def _lifted(rng: np.random.Generator, n: int, off: bool) -> tuple[Array, Array]:
-    """Lifted state, on the lift of a pose or as an update leaves it, and a covariance of full rank."""
-    x, _ = random_pose(rng)
-    s, c = np.sin(x[2]), np.cos(x[2])
-    parts = [x[0], x[1], s, c, s * s, c * c, x[0] * s, x[0] * c, x[1] * s, x[1] * c, s * c]
-    for X, Y in np.round(rng.uniform(-10, 10, (n, 2)), 2):
-        parts += [X, Y, s * X, c * X, s * Y, c * Y]
-    Z = np.round(np.array(parts) + off * 0.05 * rng.standard_normal(len(parts)), 5)
-    sigmas = [0.3, 0.25, 0.1, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.3, 0.1, *[0.4] * (6 * n)]
-    return Z, covariance(rng, np.array(sigmas))
-
-
 def _predictions(topic: Topic, rng: np.random.Generator) -> None:
     rule = tolerance(2e-13, LIFTED)
     of_vehicle = ["gtpg", "three-noises", "control-sin-cos-swapped", "no-control-noise"]
@@ -99,7 +87,7 @@ def _predictions(topic: Topic, rng: np.random.Generator) -> None:
     for flags, count, n, names in regimes:
         cases = []
         for k in range(count):
-            Z, P = _lifted(rng, n, off=flags != ())
+            Z, P = lifted_state(rng, n, off=flags != ())
             moved, cov = increment(rng)
             args = [big(v) for v in (Z, P, moved, cov)]
 
@@ -117,7 +105,7 @@ def _updates(topic: Topic, rng: np.random.Generator) -> None:
     for flag, count, n, ids in (("", 5, 1, [0]), ("several", 1, 2, [1, 0])):
         cases = []
         for k in range(count):
-            Z, P = _lifted(rng, n, off=True)
+            Z, P = lifted_state(rng, n, off=True)
             H = np.array(exact_lift.sight(), dtype=np.float64)
             at = [[*range(11), *range(11 + 6 * i, 17 + 6 * i)] for i in ids]
             z = np.round([H @ Z[columns] + 0.2 * rng.standard_normal(2) for columns in at], 3)
@@ -137,7 +125,7 @@ def _new_landmarks(topic: Topic, rng: np.random.Generator) -> None:
     for flag, count, n in (("", 7, 0), ("map", 2, 1)):
         cases = []
         for k in range(count):
-            Z, P = _lifted(rng, n, off=True)
+            Z, P = lifted_state(rng, n, off=True)
             z, cov_z = np.round(rng.uniform(-8, 8, 2), 3), covariance(rng, np.array([0.1, 0.3]))
             args = [big(v) for v in (Z, P, z, cov_z)]
 
@@ -157,3 +145,5 @@ def _traces(topic: Topic, rng: np.random.Generator) -> None:
     cases = [trace_case(inputs, exact_lift.run, mistakes if k == 0 else []) for k, inputs in enumerate(runs)]
     oracle = "straight-line lifted filter in 50 digits, its matrices by computer algebra"
     topic.group("carleman.trace", "eq-b17", oracle, rule, cases)
+    cases = [trace_case(drive(rng, 16, 3, every=5), exact_lift.run, [])]
+    topic.group("carleman.trace", "eq-cross-blocks", oracle, rule, cases, flags=("sparse",))

@@ -11,10 +11,12 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from vslam_ref.conformance.generator.building import Topic, tolerance
+from vslam_ref.conformance.generator.ekf import trace_case
 from vslam_ref.conformance.generator.exact_arrays import big, doubles, inverse, wrap
+from vslam_ref.conformance.generator.exact_ekf import anchored_run
 from vslam_ref.conformance.generator.exact_quantiles import normal_quantile, quantile
 from vslam_ref.conformance.generator.random_answers import runs
-from vslam_ref.conformance.generator.world import digits
+from vslam_ref.conformance.generator.world import digits, drive
 
 TOPIC, CHAPTER = "consistency", 17
 Array = NDArray[np.float64]
@@ -30,6 +32,14 @@ NOTES = {
         "sum of e_i^2 / P_ii",
     ),
     "per-dof": ("you divide by the degrees of freedom", "e^T P^-1 e / d"),
+    "start-not-carried": (
+        "your start's covariance is added as it is; its heading turns the whole way since",
+        "P0 + J P J^T",
+    ),
+    "own-not-turned": (
+        "the covariance of your motion is added in the axes of the start; it has to be turned",
+        "J_0 P0 J_0^T + P",
+    ),
     "entries-inverted": ("you invert P by entries", "e^T (1/P_ij) e"),
     "heading-not-wrapped": ("your heading error leaves (-pi, pi]", "truth - estimate"),
     "estimate-minus-truth": ("your error has the other sign: estimate minus truth", "estimate - truth"),
@@ -74,6 +84,7 @@ def build(rng: np.random.Generator) -> Topic:
     _pose_errors(topic, rng)
     _bands(topic, rng)
     runs(topic)
+    _anchored(topic, rng)
     return topic
 
 
@@ -226,3 +237,12 @@ def _edges(
     inputs = {"runs": runs, "dof": dof, "confidence": confidence}
     case: dict[str, Any] = {"inputs": inputs, "expected": right}
     return {**case, "mistakes": mistakes} if mistakes else case
+
+
+def _anchored(topic: Topic, rng: np.random.Generator) -> None:
+    """Runs in the frame of their start, whose uncertainty never meets a measurement."""
+    rule = tolerance(1e-12, "20 steps of sums of 9 x 9 products, each rounded by eps: 1620 eps = 4e-13")
+    mistakes = ["start-not-carried", "own-not-turned"]
+    cases = [trace_case(drive(rng, n, 3, every), anchored_run, mistakes) for n, every in ((12, 1), (20, 5))]
+    oracle = "straight-line filter in 50 digits, Jacobians by difference quotients"
+    topic.group("consistency.anchored_trace", "eq-anchored", oracle, rule, cases)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from vslam_ref.conformance.generator import exact_ekf
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact_arrays import Big, big, doubles, stack
-from vslam_ref.conformance.generator.world import covariance, drive, state, told
+from vslam_ref.conformance.generator.exact_ekf import ideal_run
+from vslam_ref.conformance.generator.world import covariance, drive, drive_truth, state, told
 
 TOPIC, CHAPTER = "ekf", 15
 Array = NDArray[np.float64]
@@ -302,6 +303,11 @@ def _traces(topic: Topic, rng: np.random.Generator) -> None:
     topic.group("ekf.trace", "eq-gain", oracle, rule, cases)
     cases = [_trace(drive(rng, 6, 2), ["process-noise-as-sensor-noise", "gtpg", "no-cross-covariance"])]
     topic.group("ekf.trace", "eq-gain", oracle, rule, cases, flags=("short",))
+    cases = []
+    for steps, landmarks, every in ((10, 2, 1), (15, 3, 4)):
+        run = drive(rng, steps, landmarks, every)
+        cases.append(trace_case({**run, **drive_truth(run)}, ideal_run, []))
+    topic.group("ekf.ideal_trace", "eq-predict", oracle, rule, cases)
 
 
 def exact_inputs(inputs: dict[str, Any]) -> dict[str, Any]:
@@ -319,9 +325,8 @@ def trace_case(inputs: dict[str, Any], run: Callable[..., Any], names: list[str]
     """A run, and runs with wrong formulas."""
 
     def steps(wrong: str) -> dict[str, Any]:
-        return {
-            "steps": [{"x": doubles(x), "P": doubles(P)} for x, P in run(exact_inputs(inputs), wrong=wrong)]
-        }
+        found = run(exact_inputs(inputs), wrong=wrong) if wrong else run(exact_inputs(inputs))
+        return {"steps": [{"x": doubles(x), "P": doubles(P)} for x, P in found]}
 
     out: dict[str, Any] = {"inputs": inputs, "expected": steps("")}
     return {**out, "mistakes": {name: steps(name) for name in names}} if names else out

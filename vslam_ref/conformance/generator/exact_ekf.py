@@ -128,6 +128,76 @@ def augment(x: Big, P: Big, z: Big, cov_z: Big, *, wrong: str = "") -> tuple[Big
     return np.concatenate([x, place(x, z)]), grown
 
 
+def ideal_run(inputs: dict[str, Any]) -> list[tuple[Big, Big]]:
+    """A run with every Jacobian at the truth; pose and its covariance."""
+    x, P, cov_u, cov_z = (inputs[key] for key in ("x", "P", "cov_u", "cov_z"))
+    truth, places = inputs["truth"], inputs["landmarks"]
+    slots: dict[int, int] = {}
+    steps = []
+    for k, (control, sighting) in enumerate(zip(inputs["controls"], inputs["sightings"], strict=True)):
+        here, there = truth[k], truth[k + 1]
+        inc = increment(control, inputs["wheelbase"], inputs["dt"])
+        D = jacobian(lambda u: increment(u, inputs["wheelbase"], inputs["dt"]), control)
+        ahead = stack([mpmath.cos(here[2]), mpmath.sin(here[2])])
+        true_inc = stack([(there - here)[:2] @ ahead, inc[1]])
+        at = np.concatenate([here, x[3:]])
+        F = jacobian(lambda y, d=true_inc: moved(y, d), at)  # type: ignore[misc]
+        G = jacobian(lambda d, y=at: moved(y, d), true_inc)  # type: ignore[misc]
+        x, P = wrapped(moved(x, inc)), F @ P @ F.T + G @ D @ cov_u @ D.T @ G.T
+        ids = sorted(slots, key=lambda i: slots[i])
+        at = np.concatenate([there, *(places[i] for i in ids)])
+        x, P = _ideal_update(x, P, at, [(slots[i], z) for i, z in sighting if i in slots], cov_z)
+        for i, z in [(i, z) for i, z in sighting if i not in slots]:
+            slots[i] = len(slots)
+            x, P = _ideal_augment(x, P, there, places[i], z, cov_z)
+        steps.append((x[:3], P[:3, :3]))
+    return steps
+
+
+def _ideal_update(x: Big, P: Big, at: Big, known: list[tuple[int, Big]], cov_z: Big) -> tuple[Big, Big]:
+    if not known:
+        return x, P
+
+    def h(y: Big) -> Big:
+        return np.concatenate([seen(y, slot) for slot, _ in known])
+
+    H, nu = jacobian(h, at), np.concatenate([z for _, z in known]) - h(x)
+    S = H @ P @ H.T + block_diagonal([cov_z] * len(known))
+    K = P @ H.T @ inverse(S)
+    return wrapped(x + K @ nu), P - K @ S @ K.T
+
+
+def _ideal_augment(x: Big, P: Big, pose: Big, place: Big, z: Big, cov_z: Big) -> tuple[Big, Big]:
+    def placed(y: Big, w: Big) -> Big:
+        return y[:2] + rotation(y[2]) @ w
+
+    relative = rotation(pose[2]).T @ (place - pose[:2])
+    G_x, G_z = zeros(2, len(x)), jacobian(lambda w: placed(pose, w), relative)
+    G_x[:, :3] = jacobian(lambda y: placed(y, relative), pose)
+    cross = G_x @ P
+    own = cross @ G_x.T + G_z @ cov_z @ G_z.T
+    return np.concatenate([x, placed(x, z)]), np.block([[P, cross.T], [cross, own]])
+
+
+def anchored_run(inputs: dict[str, Any], *, wrong: str = "") -> list[tuple[Big, Big]]:
+    """A run in the frame of its start, composed with the uncertain start."""
+    start, P0 = inputs["x"], inputs["P"]
+    local = run({**inputs, "x": zeros(3), "P": zeros(3, 3)})
+
+    def composed(a: Big, b: Big) -> Big:
+        return stack([*(a[:2] + rotation(a[2]) @ b[:2]), a[2] + b[2]])
+
+    steps = []
+    for x, P in local:
+        pose, own = x[:3], P[:3, :3]
+        J_start = jacobian(lambda a, b=pose: composed(a, b), start)  # type: ignore[misc]
+        J_pose = jacobian(lambda b: composed(start, b), pose)
+        from_start = P0 if wrong == "start-not-carried" else J_start @ P0 @ J_start.T
+        added = own if wrong == "own-not-turned" else J_pose @ own @ J_pose.T
+        steps.append((wrapped(composed(start, pose)), from_start + added))
+    return steps
+
+
 def run(inputs: dict[str, Any], *, wrong: str = "") -> list[tuple[Big, Big]]:
     """A whole run: for every control predict, update with what is known, add what is new, in order."""
     x, P, steps = inputs["x"], inputs["P"], []

@@ -28,6 +28,7 @@ from vslam_ref.conformance.generator.exact_arrays import (
     zeros,
 )
 from vslam_ref.conformance.generator.exact_ekf import increment
+from vslam_ref.conformance.generator.exact_moments import LIFT, MONOMIALS, POSE, moments
 
 BASIC = x, y, s, c, X, Y = sympy.symbols("x y s c X Y")
 CONTROL = u1, u2, u3 = sympy.symbols("u1 u2 u3")
@@ -107,6 +108,25 @@ def lifted_start(pose: Big, P: Big, *, wrong: str = "") -> tuple[Big, Big]:
     return Z, P_Z
 
 
+def gaussian_start(pose: Big, P: Big, *, wrong: str = "") -> tuple[Big, Big]:
+    """Exact mean and covariance of the lifted pose."""
+    return lifted_start(pose, P) if wrong == "first-order" else moments(LIFT, pose, P)
+
+
+def reduced_start(pose: Big, P: Big, *, wrong: str = "") -> tuple[Big, Big]:
+    """Exact mean and covariance of (x, y, sin, cos)."""
+    if wrong == "first-order":
+        Z, P_Z = lifted_start(pose, P)
+        return Z[:4], P_Z[:4, :4]
+    return moments(POSE, pose, P)
+
+
+def lifted_landmark(pose: Big, place: Big) -> Big:
+    """Six products of a landmark and the heading."""
+    s_, c_ = mpmath.sin(pose[2]), mpmath.cos(pose[2])
+    return stack([place[0], place[1], s_ * place[0], c_ * place[0], s_ * place[1], c_ * place[1]])
+
+
 def control(inc: Big, cov: Big, *, wrong: str = "") -> tuple[Big, Big]:
     """U = (ds, sin, cos) of an increment, and its covariance to first order, of rank 2."""
 
@@ -137,6 +157,42 @@ def predict(Z: Big, P: Big, inc: Big, cov: Big, *, wrong: str = "") -> tuple[Big
     if wrong == "no-cross-blocks":
         after = _diagonal_blocks(after)
     return M @ Z, after
+
+
+def predict_gaussian(Z: Big, P: Big, inc: Big, cov: Big, *, wrong: str = "") -> tuple[Big, Big]:
+    """As :func:`predict`, with exact means and covariances of the control's monomials.
+
+    The step is linear in the monomials w: M(w) Z = sum of w_k M_k Z, M_0 without any.
+    """
+    n = (len(Z) - 11) // 6
+    three, K = stack([inc[0], mpf(0), inc[1]]), zeros(3, 3)
+    K[0, 0], K[0, 2], K[2, 0], K[2, 2] = cov[0, 0], cov[0, 1], cov[1, 0], cov[1, 1]
+    w, C = moments(MONOMIALS, three, K)
+    if wrong == "product-of-means":
+        u = w[:3]
+        w = stack([*u, u[1] ** 2, u[1] * u[2], u[2] ** 2, u[0] * u[1], u[0] * u[2]])
+    parts = [block_diagonal([R, *[L] * n]) for R, L in zip(*monomial_matrices(), strict=True)]
+    M = sum((value * part for value, part in zip(w, parts[1:], strict=True)), parts[0])
+    J = np.stack([part @ Z for part in parts[1:]], 1)
+    return M @ Z, M @ P @ M.T + J @ C @ J.T
+
+
+@functools.cache
+def monomial_matrices() -> tuple[list[Big], list[Big]]:
+    """Constant matrices of 1, u1, u2, u3, u2 u2, u2 u3, u3 u3, u1 u2, u1 u3: vehicle, landmark."""
+    products = [(), (u1,), (u2,), (u3,), (u2, u2), (u2, u3), (u3, u3), (u1, u2), (u1, u3)]
+    out = []
+    for states in (VEHICLE, LANDMARK):
+        M = _rows(_stepped(states), states)
+        keys = [tuple(sum(q == u for q in product) for u in CONTROL) for product in products]
+        parts = [sympy.zeros(*M.shape) for _ in keys]
+        for i in range(M.rows):
+            for j in range(M.cols):
+                for powers, factor in sympy.Poly(M[i, j], *CONTROL).terms():
+                    if factor != 0:
+                        parts[keys.index(powers)][i, j] += factor
+        out.append([from_matrix(mpmath.matrix(part.tolist())) for part in parts])
+    return out[0], out[1]
 
 
 def _diagonal_blocks(P: Big) -> Big:
@@ -219,6 +275,28 @@ def reduced_predict(m: Big, P: Big, inc: Big, cov: Big, *, wrong: str = "") -> t
         noise = block_diagonal([noise[i:j, i:j] for i, j in itertools.pairwise(edges)])
     after = M.T @ P @ M + noise if wrong == "gtpg" else M @ P @ M.T + noise
     return step(m, inc), after
+
+
+def reduced_gaussian(m: Big, P: Big, inc: Big, cov: Big, *, wrong: str = "") -> tuple[Big, Big]:
+    """As :func:`reduced_predict`, with exact moments of u1, u2, u3, u1 u2, u1 u3: linear in all five."""
+    three, K = stack([inc[0], mpf(0), inc[1]]), zeros(3, 3)
+    K[0, 0], K[0, 2], K[2, 0], K[2, 2] = cov[0, 0], cov[0, 1], cov[1, 0], cov[1, 1]
+    used = [0, 1, 2, 6, 7]
+    w, C = moments(MONOMIALS, three, K)
+    w, C = w[used], C[used][:, used]
+    if wrong == "product-of-means":
+        w = stack([*w[:3], w[0] * w[1], w[0] * w[2]])
+
+    def step(state: Big, v: Big) -> Big:
+        x_, y_, s_, c_ = state[:4]
+        d, sin, cos, d_sin, d_cos = v
+        out = [x_ + d * c_, y_ + d * s_, s_ * cos + c_ * sin, c_ * cos - s_ * sin]
+        for r in state[4:].reshape(-1, 2):
+            out += [cos * r[0] + sin * r[1] - d_cos, cos * r[1] - sin * r[0] + d_sin]
+        return stack(out)
+
+    M, J = jacobian(lambda state: step(state, w), m), jacobian(lambda v: step(m, v), w)
+    return step(m, w), M @ P @ M.T + J @ C @ J.T
 
 
 def run(inputs: dict[str, Any], *, wrong: str = "") -> list[tuple[Big, Big]]:

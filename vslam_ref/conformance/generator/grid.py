@@ -45,6 +45,22 @@ NOTES = {
         "your D starts anew, as the text at A4.3 has it; d_memory 'formula' was asked for",
         "L(D_t) = L(D | o_t, S_t-1)",
     ),
+    "d-never-stale": (
+        "your D keeps what was not looked at for longer than its lifetime",
+        "L(D_t-1) however old",
+    ),
+    "never-settles": (
+        "your S never takes in what came to stay on free floor",
+        "S keeps its log odds however long the cell is hit",
+    ),
+    "stay-never-ends": (
+        "your stays do not end: a miss long after the last hit means that the thing has left",
+        "first hit ever for first hit of this stay",
+    ),
+    "unseen-time-counts": (
+        "you count the time at which nobody looked to a stay",
+        "now - first hit, gaps included",
+    ),
     "d-high-elsewhere": (
         "your D is high where S was unknown for free, or free for unknown: the other of the two readings",
         "d_high at the other d_high_where",
@@ -75,6 +91,7 @@ def build(rng: np.random.Generator) -> Topic:
     _recursion(topic, rng)
     _two_maps(topic, rng)
     rays(topic, rng)
+    _histories(topic, rng)
     return topic
 
 
@@ -270,3 +287,51 @@ def _cell(s: float, d: float, seen: str, memory: str, where: str) -> dict[str, A
     inputs = {**inputs, "d_memory": memory, "d_high_where": where, "most": MOST}
     case: dict[str, Any] = {"inputs": inputs, "expected": {"s": float(right[0]), "d": float(right[1])}}
     return {**case, "mistakes": mistakes} if mistakes else case
+
+
+def history(
+    times: list[float], seen: list[str], memory: str, where: str, rules: dict[str, float], wrong: str = ""
+) -> dict[str, list[float]]:
+    """Log odds of S and D of one cell after each observation."""
+    s, d, looked, last_hit = mpf(0), mpf(0), mpf("-inf"), mpf("-inf")
+    since: Any = None  # when the stay that goes on began
+    path: dict[str, list[float]] = {"s": [], "d": []}
+    for now, what in zip(map(mpf, times), seen, strict=True):
+        stale = now - looked > rules["d_lifetime"] and wrong != "d-never-stale"
+        away = now - looked if now - looked > rules["hit_gap"] else mpf(0)
+        if what == "hit":
+            since = now if since is None else since + (0 if wrong == "unseen-time-counts" else away)
+            if _state(s) == "free" and now - since >= rules["settle_seconds"] and wrong != "never-settles":
+                s = mpf(0)
+            last_hit = now
+        elif since is not None and now - last_hit > rules["hit_gap"] and wrong != "stay-never-ends":
+            since = None
+        s, d = both_maps(s, mpf(0) if stale else d, what, memory, where)
+        looked = now
+        path["s"].append(float(s))
+        path["d"].append(float(d))
+    return path
+
+
+def _histories(topic: Topic, rng: np.random.Generator) -> None:
+    rule = tolerance(1e-14, "a sum of a dozen log odds", absolute=1e-14)
+    rules = {"d_lifetime": 1.0, "settle_seconds": 3.0, "hit_gap": 0.8}
+    for memory in ("formula", "text"):
+        cases = []
+        for k in range(8):
+            gaps = rng.choice([0.25, 0.5, 1.25], 22, p=[0.5, 0.4, 0.1])
+            times = (np.cumsum(gaps)).tolist()
+            chance = np.r_[np.full(6, 0.15), np.full(16, 0.9)]
+            seen = ["hit" if hit else "miss" for hit in rng.uniform(size=22) < chance]
+            where = ("free", "unknown")[k % 2]
+            right = history(times, seen, memory, where, rules)
+            inputs = {"times": times, "observations": seen, "table": TABLE, "most": MOST, **rules}
+            mistakes: dict[str, Any] = {}
+            for name in ("d-never-stale", "never-settles", "stay-never-ends", "unseen-time-counts"):
+                wrong = history(times, seen, memory, where, rules, name)
+                if wrong not in (right, *mistakes.values()):
+                    mistakes[name] = wrong
+            one: dict[str, Any] = {"inputs": {**inputs, "d_memory": memory, "d_high_where": where}}
+            one["expected"] = right
+            cases.append({**one, "mistakes": mistakes} if mistakes else one)
+        topic.group("grid.history", "eq-a4-3", DEFINITION, rule, cases, flags=(f"memory_{memory}",))

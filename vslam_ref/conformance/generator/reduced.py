@@ -11,7 +11,8 @@ from vslam_ref.conformance.generator import exact_lift
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.ekf import case, some, trace_case
 from vslam_ref.conformance.generator.exact_arrays import big
-from vslam_ref.conformance.generator.world import covariance, drive, increment, random_pose
+from vslam_ref.conformance.generator.lift import gaussian_tolerance
+from vslam_ref.conformance.generator.world import covariance, digits, drive, increment, random_pose
 
 TOPIC, CHAPTER = "reduced", 16
 Array = NDArray[np.float64]
@@ -22,6 +23,14 @@ NOTES = {
     "no-common-noise": (
         "your noise enters the diagonal blocks only, which is all that B17 and B19 print",
         "J_U Q_U J_U^T without its cross blocks",
+    ),
+    "first-order": (
+        "your moments are those of first order; the exact ones of a Gaussian were asked for",
+        "(x, y, sin, cos) of the mean, J P J^T",
+    ),
+    "product-of-means": (
+        "you put products of means where the means of products belong",
+        "E[u1] E[u3] for E[u1 u3]",
     ),
     "landmarks-turn-left": (
         "your landmarks turn with the vehicle, to the left; seen from it they turn to the right",
@@ -41,6 +50,7 @@ def build(rng: np.random.Generator) -> Topic:
         topic.note(identity, meaning, formula)
     _reduced(topic, rng)
     _traces(topic, rng)
+    _gaussian(topic, rng)
     return topic
 
 
@@ -72,3 +82,38 @@ def _traces(topic: Topic, rng: np.random.Generator) -> None:
     cases = [trace_case(inputs, exact_lift.run, []) for inputs in runs]
     oracle = "straight-line filter of all 11 + 6n states in 50 digits, its matrices by computer algebra"
     topic.group("reduced.trace", "eq-reduction", oracle, rule, cases)
+    cases = [trace_case(drive(rng, 20, 3, every=5), exact_lift.run, [])]
+    cases += [trace_case(drive(rng, 38, 2, every=19), exact_lift.run, [])]
+    topic.group("reduced.trace", "eq-reduction", oracle, rule, cases, flags=("sparse",))
+
+
+def _gaussian(topic: Topic, rng: np.random.Generator) -> None:
+    oracle = "derivatives of the moment generating function by computer algebra, 50 digits"
+    for flag, scale in (("", 1.0), ("small_noise", 1e-4)):
+        rule = gaussian_tolerance(flag)
+        starts, steps = [], []
+        for k in range(8):
+            x, _ = random_pose(rng)
+            P = digits(covariance(rng, np.array([0.3, 0.25, 0.4])) * scale**2)
+
+            def started(wrong: str, x: Array = x, P: Array = P) -> Any:
+                return exact_lift.reduced_start(big(x), big(P), wrong=wrong)
+
+            names = ["first-order"] if not flag else []
+            starts.append(case({"x": x, "P": P}, started, names, ("m", "P")))
+            n = k % 3
+            m = np.round([*x[:2], np.sin(x[2]), np.cos(x[2]), *rng.uniform(-9, 9, 2 * n)], 4)
+            P = covariance(rng, np.array([0.3, 0.25, 0.1, 0.1, *[0.4] * (2 * n)]))
+            moved, cov = increment(rng)
+            cov = digits(9 * cov * scale**2)
+            args = [big(v) for v in (m, P, moved, cov)]
+
+            def stepped(wrong: str, args: list[Any] = args) -> Any:
+                return exact_lift.reduced_gaussian(*args, wrong=wrong)
+
+            names = ["product-of-means"] if not flag and n else []
+            inputs = {"m": m, "P": P, "increment": moved, "cov": cov}
+            steps.append(case(inputs, stepped, names, ("m", "P")))
+        flags = (flag,) if flag else ()
+        topic.group("reduced.start", "eq-gaussian-moments", oracle, rule, starts, flags=flags)
+        topic.group("reduced.gaussian_predict", "eq-gaussian-moments", oracle, rule, steps, flags=flags)

@@ -11,7 +11,7 @@ from mpmath import mpf
 
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact_arrays import Big, big, doubles, stack
-from vslam_ref.conformance.generator.exact_ekf import increment, moved, wrapped
+from vslam_ref.conformance.generator.exact_ekf import increment, moved, rotation, wrapped
 
 TOPIC, CHAPTER = "vehicle", 15
 DEFINITION = "definition, 50 digits"
@@ -43,6 +43,14 @@ NOTES = {
     ),
     "heading-not-wrapped": ("your heading leaves (-pi, pi]", "theta + turn, not wrapped"),
     "sin-cos-swapped": ("sine and cosine of the heading are swapped", "x + v dt sin(theta)"),
+    "transposed-rotation": (
+        "you turn the wrong way between the axes of the vehicle and those of the world",
+        "R for R^T, R^T for R",
+    ),
+    "not-turned": (
+        "you take the relative place for one in global axes, as B20 is printed",
+        "landmark - position, position + z",
+    ),
     "sine-of-the-ratio": (
         "your yaw is the sine of the steering angle over the wheelbase: a misplaced bracket",
         "theta + V dt sin(G/wheelbase)",
@@ -90,9 +98,26 @@ def build(rng: np.random.Generator) -> Topic:
         if flag in ("", "reverse", "near_pi", "straight"):
             cases = [_front(draw()) for _ in range(min(count, 15))]
             topic.group("vehicle.front_wheel", "eq-b4", DEFINITION, rule, cases, flags=flags)
+    _sightings(topic, rng, rule)
     cases = [_other_convention(regimes[""][1]()) for _ in range(5)]
     topic.group("vehicle.ackermann", "eq-b4", DEFINITION, rule, cases, flags=("convention",))
     return topic
+
+
+def _sightings(topic: Topic, rng: np.random.Generator, rule: dict[str, Any]) -> None:
+    """A landmark seen, and one placed."""
+    seen, placed = [], []
+    for _ in range(12):
+        x = np.round([*rng.uniform(-20, 20, 2), rng.uniform(-3.1, 3.1)], 3)
+        other = np.round(rng.uniform(-20, 20, 2), 3)
+        pose, point, R = big(x), big(other), rotation(mpf(x[2]))
+        d = point - pose[:2]
+        wrong = {"transposed-rotation": R @ d, "not-turned": d}
+        seen.append(_case({"x": x, "landmark": other}, R.T @ d, wrong, "z"))
+        wrong = {"transposed-rotation": pose[:2] + R.T @ point, "not-turned": pose[:2] + point}
+        placed.append(_case({"x": x, "z": other}, pose[:2] + R @ point, wrong, "landmark"))
+    topic.group("vehicle.relative", "eq-b21", DEFINITION, rule, seen)
+    topic.group("vehicle.place", "eq-b25", DEFINITION, rule, placed)
 
 
 def _inputs(rng: np.random.Generator, speed: tuple[float, float], steering: tuple[float, float]) -> list[Any]:
@@ -167,12 +192,12 @@ def _other_convention(inputs: list[Any]) -> dict[str, Any]:
     return {**case, "mistakes": mistakes, "result": "convention"}
 
 
-def _case(inputs: dict[str, Any], right: Big, wrong: dict[str, Big]) -> dict[str, Any]:
+def _case(inputs: dict[str, Any], right: Big, wrong: dict[str, Big], name: str = "x") -> dict[str, Any]:
     """A case; a wrong formula that gives nearly the right value, or another's, is none of its mistakes."""
     apart, known = {}, [right]
-    for name, value in wrong.items():
+    for note, value in wrong.items():
         if all(max(abs(v) for v in value - other) > 1e-9 for other in known):
-            apart[name] = {"x": doubles(value)}
+            apart[note] = {name: doubles(value)}
             known.append(value)
-    case = {"inputs": inputs, "expected": {"x": doubles(right)}}
+    case = {"inputs": inputs, "expected": {name: doubles(right)}}
     return {**case, "mistakes": apart} if apart else case

@@ -53,15 +53,30 @@ def increment(rng: np.random.Generator) -> tuple[Array, Array]:
     return np.round([ds, turn], 3), covariance(rng, np.array([0.1, 0.06]))
 
 
+def lifted_state(rng: np.random.Generator, n: int, off: bool) -> tuple[Array, Array]:
+    """Lifted state, on the lift of a pose or as an update leaves it, and a covariance of full rank."""
+    x, _ = random_pose(rng)
+    s, c = np.sin(x[2]), np.cos(x[2])
+    parts = [x[0], x[1], s, c, s * s, c * c, x[0] * s, x[0] * c, x[1] * s, x[1] * c, s * c]
+    for X, Y in np.round(rng.uniform(-10, 10, (n, 2)), 2):
+        parts += [X, Y, s * X, c * X, s * Y, c * Y]
+    Z = np.round(np.array(parts) + off * 0.05 * rng.standard_normal(len(parts)), 5)
+    sigmas = [0.3, 0.25, 0.1, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.3, 0.1, *[0.4] * (6 * n)]
+    return Z, covariance(rng, np.array(sigmas))
+
+
 def told(x: Array, landmark: Array) -> Array:
     """Relative place of a landmark, for making a measurement."""
     c, s = np.cos(x[2]), np.sin(x[2])
     return np.asarray(np.array([[c, s], [-s, c]]) @ (landmark - x[:2]))
 
 
-def drive(rng: np.random.Generator, steps: int, landmarks: int) -> dict[str, Any]:
-    """Inputs of a run: a bend through posts, of which each comes into sight at its own time."""
-    wheelbase, dt, reach = 1.2, 0.5, 6.0
+def drive(rng: np.random.Generator, steps: int, landmarks: int, every: int = 1) -> dict[str, Any]:
+    """Inputs of a run: a bend through posts, of which each comes into sight at its own time.
+
+    With ``every`` more than 1, all posts in a wider reach are seen, but only at every so many steps.
+    """
+    wheelbase, dt, reach = 1.2, 0.5, 6.0 if every == 1 else 12.0
     truth = np.array([0.4, -0.2, 2.4])
     places = _places(truth, steps, landmarks, wheelbase, dt, rng)
     cov_u, cov_z = covariance(rng, np.array([0.1, 0.03])), covariance(rng, np.array([0.08, 0.12]))
@@ -70,7 +85,8 @@ def drive(rng: np.random.Generator, steps: int, landmarks: int) -> dict[str, Any
         control = _control(k)
         truth = _moved(truth, control, wheelbase, dt)
         controls.append(np.round(control + rng.multivariate_normal([0, 0], cov_u), 4))
-        near = [i for i, place in enumerate(places) if np.hypot(*(place - truth[:2])) < reach and (k + i) % 3]
+        near = [i for i, place in enumerate(places) if np.hypot(*(place - truth[:2])) < reach]
+        near = [i for i in near if (k + i) % 3] if every == 1 else near if k % every == every - 1 else []
         z = [np.round(told(truth, places[i]) + rng.multivariate_normal([0, 0], cov_z), 4) for i in near]
         sightings.append({"ids": near[::-1], "z": [v.tolist() for v in z[::-1]]})
     start = np.array([0.5, -0.3, 2.35])
@@ -78,6 +94,22 @@ def drive(rng: np.random.Generator, steps: int, landmarks: int) -> dict[str, Any
         **{"x": start, "P": covariance(rng, np.array([0.2, 0.2, 0.08])), "wheelbase": wheelbase, "dt": dt},
         **{"controls": np.array(controls), "cov_u": cov_u, "sightings": sightings, "cov_z": cov_z},
     }
+
+
+def drive_truth(run: dict[str, Any]) -> dict[str, Array]:
+    """A truth for a run, near what it measured: poses (K + 1, 3), and landmarks (n, 2) by id."""
+    pose = run["x"] - np.array([0.1, -0.1, -0.05])
+    poses = [pose]
+    places: dict[int, Array] = {}
+    for control, seen in zip(run["controls"], run["sightings"], strict=True):
+        pose = _moved(pose, control, run["wheelbase"], run["dt"])
+        poses.append(pose)
+        for i, z in zip(seen["ids"], seen["z"], strict=True):
+            c, s = np.cos(pose[2]), np.sin(pose[2])
+            places.setdefault(i, pose[:2] + np.array([[c, -s], [s, c]]) @ z + 0.05)
+    ids = range(max(places) + 1)
+    known = np.array([places.get(i, np.zeros(2)) for i in ids])
+    return {"truth": np.round(poses, 6), "landmarks": np.round(known, 6)}
 
 
 def _control(k: int) -> Array:

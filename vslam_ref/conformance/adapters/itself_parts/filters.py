@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
-from vslam_ref.filters import vehicle
+from vslam_ref.filters import observation, vehicle
 from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, ReducedCarlemanEkf, carleman_ekf, lift, moments
-from vslam_ref.filters.ekf_slam import EkfSlam
+from vslam_ref.filters.carleman_ekf.reduced_moments import start_moments
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.filters.range_bearing import cartesian_from_polar
 
@@ -76,10 +77,10 @@ def _trace(x: Array, P: Array, **run: Any) -> Steps:
 # -- chapter 16 ------------------------------------------------------------------------------------
 
 
-def _lifted(Z: Array, P: Array) -> LiftedCarlemanEkf:
+def _lifted(Z: Array, P: Array, control: str = "first_order") -> LiftedCarlemanEkf:
     """The lifted filter in the middle of a run."""
     n = (len(Z) - lift.VEHICLE) // lift.LANDMARK
-    slam = LiftedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=n)
+    slam = LiftedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=n, control=control)
     slam._z, slam._P = Z[None].copy(), P[None].copy()
     slam._slots = {i: i for i in range(n)}
     return slam
@@ -99,8 +100,10 @@ def _lift(x: Array, P: Array) -> dict[str, Array]:
     return {"Z": Z[0], "P_Z": P_Z[0]}
 
 
-def _lifted_predict(Z: Array, P: Array, increment: Array, cov: Array) -> dict[str, Array]:
-    slam = _lifted(Z, P)
+def _lifted_predict(
+    Z: Array, P: Array, increment: Array, cov: Array, control: str = "first_order"
+) -> dict[str, Array]:
+    slam = _lifted(Z, P, control)
     slam.predict(_increment(increment, cov))
     return _lifted_state(slam)
 
@@ -124,10 +127,12 @@ def _pose(z: Array, P: Array) -> dict[str, Array]:
     return {"x": mean[0], "P": cov[0]}
 
 
-def _reduced_predict(m: Array, P: Array, increment: Array, cov: Array) -> dict[str, Array]:
+def _reduced_predict(
+    m: Array, P: Array, increment: Array, cov: Array, control: str = "first_order"
+) -> dict[str, Array]:
     """Landmarks are r = c rho - tau inside: rho is r at the start, and is turned back at the end."""
     n = (len(m) - 4) // 2
-    slam = ReducedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=max(n, 1))
+    slam = ReducedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=max(n, 1), control=control)
     slam._blocks.x_p[:], slam._blocks.P_pp[:] = m[:4], P[:4, :4]
     slam._blocks.append(np.arange(n), m[None, 4:], P[None, 4:, 4:], P[None, :4, 4:], np.zeros((1, 0, 2 * n)))
     slam.predict(_increment(increment, cov))
@@ -141,12 +146,35 @@ def _reduced_predict(m: Array, P: Array, increment: Array, cov: Array) -> dict[s
     return {"m": after, "P": turn @ full[0] @ turn.T}
 
 
-def _poses(form: str, x: Array, P: Array, **run: Any) -> Steps:
-    steps = _drive(carleman_ekf(x, P, form=form), **run)
-    return [{"x": pose.mean[0], "P": pose.cov[0]} for pose in (slam.pose() for slam in steps)]
+def _ideal(x: Array, P: Array, truth: Array, landmarks: Array, **run: Any) -> Steps:
+    return _pose_steps(EkfSlam(x, P, truth=Truth(truth, landmarks)), **run)
+
+
+def _pose_steps(slam: SlamFilter, **run: Any) -> Steps:
+    poses = [step.pose() for step in _drive(slam, **run)]
+    return [{"x": pose.mean[0], "P": pose.cov[0]} for pose in poses]
+
+
+def _lift_gaussian(x: Array, P: Array) -> dict[str, Array]:
+    Z, P_Z = moments.lifted_start(x[None], P[None], "gaussian")
+    return {"Z": Z[0], "P_Z": P_Z[0]}
+
+
+def _reduced_start(x: Array, P: Array) -> dict[str, Array]:
+    m, P_m = start_moments(x[None], P[None], "gaussian")
+    return {"m": m[0], "P": P_m[0]}
 
 
 TABLE: Answers = {
+    "vehicle.relative": lambda x, landmark: observation.vehicle_from_world(x, landmark),
+    "vehicle.place": lambda x, z: observation.world_from_vehicle(x, z),
+    "ekf.ideal_trace": _ideal,
+    "lift.landmark": lambda x, landmark: lift.lift_landmark(x, landmark),
+    "lift.gaussian": _lift_gaussian,
+    "lift.gaussian_predict": lambda **inputs: _lifted_predict(control="gaussian", **inputs),
+    "reduced.start": _reduced_start,
+    "reduced.gaussian_predict": lambda **inputs: _reduced_predict(control="gaussian", **inputs),
+    "consistency.anchored_trace": lambda x, P, **run: _pose_steps(AnchoredEkf(x, P), **run),
     "vehicle.ackermann": lambda x, control, wheelbase, track, dt: vehicle.propagate(
         x, vehicle.ackermann(control, wheelbase, dt)
     ),
@@ -164,6 +192,6 @@ TABLE: Answers = {
     "carleman.augment": _lifted_augment,
     "lift.pose": _pose,
     "reduced.predict": _reduced_predict,
-    "carleman.trace": lambda x, P, **run: _poses("lifted", x, P, **run),
-    "reduced.trace": lambda x, P, **run: _poses("reduced", x, P, **run),
+    "carleman.trace": lambda x, P, **run: _pose_steps(carleman_ekf(x, P, form="lifted"), **run),
+    "reduced.trace": lambda x, P, **run: _pose_steps(carleman_ekf(x, P, form="reduced"), **run),
 }

@@ -13,40 +13,60 @@ from vslam_ref.grids import inverse_sensor, log_odds, rays, recursion, static_dy
 Array = NDArray[np.float64]
 SIDE = 7
 """Cells of a map's side: a beam must stay a cell away from the border."""
+CELL = SIDE * (SIDE // 2) + SIDE // 2
+"""The middle cell."""
 
 
-def _static_dynamic(
-    s: float,
-    d: float,
-    observation: str,
+def _static_dynamic(s: float, d: float, observation: str, **settings: Any) -> dict[str, float]:
+    """One beam through, or into, the middle cell of a small map that was looked at a moment ago."""
+    layers = _layers()
+    layers[0, CELL], layers[1, CELL], layers[2] = s, d, 9.9
+    _look(layers, 10.0, observation, _config(**settings))
+    return {"s": float(layers[0, CELL]), "d": float(layers[1, CELL])}
+
+
+def _history(times: Array, observations: list[str], **settings: Any) -> dict[str, list[float]]:
+    layers, config = _layers(), _config(**settings)
+    path: dict[str, list[float]] = {"s": [], "d": []}
+    for now, observation in zip(times.tolist(), observations, strict=True):
+        _look(layers, now, observation, config)
+        path["s"].append(float(layers[0, CELL]))
+        path["d"].append(float(layers[1, CELL]))
+    return path
+
+
+def _layers() -> Array:
+    """S, D, and the times of the last look, the last hit and the first hit of a stay."""
+    layers = np.zeros((5, SIDE * SIDE))
+    layers[2:4] = -np.inf
+    return layers
+
+
+def _config(
     table: dict[str, float],
-    d_memory: Any,
-    d_high_where: Any,
     most: dict[str, float],
-) -> dict[str, float]:
-    """One beam through, or into, the middle cell of a small map."""
-    config = static_dynamic.MapConfig(
+    settle_seconds: float | None = None,
+    **settings: Any,
+) -> static_dynamic.MapConfig:
+    return static_dynamic.MapConfig(
         sensor=inverse_sensor.InverseSensor(**table),
-        d_memory=d_memory,
-        d_high_where=d_high_where,
         explained_by=0,
-        settle_seconds=None,
+        settle_seconds=settle_seconds,
         s_most=most["s"],
         d_most=most["d"],
+        **settings,
     )
-    cell, now = SIDE * (SIDE // 2) + SIDE // 2, 10.0
-    layers = np.zeros((5, SIDE * SIDE))
-    layers[0, cell], layers[1, cell] = s, d
-    layers[2], layers[3] = now - 0.1, -np.inf  # looked at a moment ago, never hit
+
+
+def _look(layers: Array, now: float, observation: str, config: static_dynamic.MapConfig) -> None:
     steps = config.sensor.steps(config.d_high_where)
     end = [[3.5, 3.5]] if observation == "hit" else [[4.5, 3.5]]
     beam = np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"])
     where = static_dynamic.limits(config)
-    s_map, d_map, seen, last_hit, since = layers
+    s, d, seen, last_hit, since = layers
     static_dynamic.apply_scan(
-        s_map, d_map, seen, last_hit, since, SIDE, *beam, steps.static, steps.dynamic, where, now
+        s, d, seen, last_hit, since, SIDE, *beam, steps.static, steps.dynamic, where, now
     )
-    return {"s": float(layers[0, cell]), "d": float(layers[1, cell])}
 
 
 TABLE: Answers = {
@@ -57,6 +77,7 @@ TABLE: Answers = {
     ),
     "grid.follow": lambda start, evidence: recursion.follow(evidence, "printed", "evidence", start),
     "grid.static_dynamic": _static_dynamic,
+    "grid.history": _history,
     "grid.ray_cells": lambda start, end: rays.crossed_cells(start, [end]).cells[:, ::-1],
 }
 
