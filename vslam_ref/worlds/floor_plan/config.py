@@ -139,10 +139,11 @@ class FloorPlanConfig:
         0.05, "m", "a person who shifted less than this within T stands: swaying is no walk"
     )
     carts: int = _assume(0, "", "boxes on wheels that are pushed to and fro: moving things with corners")
+    cart_speed: float = _assume(0.3, "m/s", "a trolley that somebody loads as it goes")
     duration: float = _assume(1e9, "s", "stop after this long, or at the end of the route")
 
     def __post_init__(self) -> None:
         """Refuse floors that cannot be."""
         _refuse_not_finite(self)
-        if self.memory <= 0 or self.moved_least < 0 or self.carts < 0 or self.duration <= 0:
-            raise ValueError("need memory > 0, moved_least >= 0, carts >= 0 and duration > 0")
+        if min(self.memory, self.duration, self.cart_speed) <= 0 or self.moved_least < 0 or self.carts < 0:
+            raise ValueError("need memory > 0, duration > 0, cart_speed > 0, moved_least >= 0 and carts >= 0")

@@ -130,7 +130,7 @@ def simulate(config: FloorPlanConfig, rng: np.random.Generator, plan: FloorPlan 
         if config.plan not in PLANS:
             raise ValueError(f"plan {config.plan!r}: need one of {', '.join(PLANS)}")
         plan = PLANS[config.plan]()
-    plan = with_carts(plan, config.carts, for_carts, config.robot.radius)
+    plan = with_carts(plan, config.carts, for_carts, config.robot.radius, config.cart_speed)
     start, increments = true_increments(plan.route, config.robot)
     n = min(len(increments), int(config.duration / config.robot.scan_period))
     increments = increments[:n]
@@ -230,13 +230,13 @@ def _look(
 
 CART = (0.8, 0.5)
 """Metres; its corners lie 0.47 m from its middle."""
-CART_SPEED = 0.3
-"""Metres a second: a trolley that somebody loads as it goes."""
 CART_GAP = 0.1
 """Metres between the circle around a cart and walls, things, other carts, and the robot."""
 
 
-def with_carts(plan: FloorPlan, carts: int, rng: np.random.Generator, robot_radius: float = 0.3) -> FloorPlan:
+def with_carts(
+    plan: FloorPlan, carts: int, rng: np.random.Generator, robot_radius: float = 0.3, speed: float = 0.3
+) -> FloorPlan:
     """Add boxes on wheels, each pushed to and fro on a free straight line.
 
     A cart stands for 12 to 25 s (the first time 4 to 15 s), then moves by 1 to 2.5 m, and so on.
@@ -259,14 +259,14 @@ def with_carts(plan: FloorPlan, carts: int, rng: np.random.Generator, robot_radi
         keep_off = ((fixed, radius), (lines, 2 * radius), (route, radius + robot_radius))
         line = _free_line(plan, keep_off, rng)
         lines = np.concatenate([lines, line.reshape(1, 4)])
-        things.append(Box(CART, _to_and_fro(line, rng)))
+        things.append(Box(CART, _to_and_fro(line, speed, rng)))
     return dataclasses.replace(plan, things=tuple(things))
 
 
-def _to_and_fro(line: Array, rng: np.random.Generator, until: float = 200.0) -> Schedule:
+def _to_and_fro(line: Array, speed: float, rng: np.random.Generator, until: float = 200.0) -> Schedule:
     """Poses of a cart on a line (2, 2)."""
     way = line[1] - line[0]
-    heading, duration = float(np.arctan2(way[1], way[0])), float(np.hypot(*way)) / CART_SPEED
+    heading, duration = float(np.arctan2(way[1], way[0])), float(np.hypot(*way)) / speed
     t, at = float(rng.uniform(4.0, 15.0)), 0
     times, values = [0.0], [[*line[0], heading]]
     while t < until:
