@@ -161,6 +161,18 @@ def jacobian_intrinsics(model: str, params: Array, X_cam: Array, wrong: str | No
     return J
 
 
+def jacobian_ray(model: str, params: Array, uv: Array, wrong: str | None = None) -> Array:
+    """Inverse of the plane's Jacobian, then that of the length."""
+    lens_used = "pinhole" if wrong == "ideal-ray" else model
+    b = unproject(lens_used, params, uv)["bearing"]
+    X = b / b[2]
+    inverse = np.linalg.inv(jacobian_point(lens_used, params, X)[:, :2])
+    plane = np.vstack([inverse, np.zeros(2)])
+    if wrong == "ray-not-unit":
+        return plane
+    return (np.eye(3) - np.outer(b, b)) @ plane / np.linalg.norm(X)
+
+
 def jacobian_pose(model: str, params: Array, pose: Array, X_world: Array, wrong: str | None = None) -> Array:
     R, t = pose[:3, :3], pose[:3, 3]
     X = R @ X_world + t
@@ -184,5 +196,13 @@ def jacobian_rig(
     return np.hstack([J @ R, -J @ R @ skew(X_rig)])
 
 
-FUNCTIONS = (project, unproject, jacobian_point, jacobian_intrinsics, jacobian_pose, jacobian_rig)
+FUNCTIONS = (
+    project,
+    unproject,
+    jacobian_point,
+    jacobian_intrinsics,
+    jacobian_pose,
+    jacobian_rig,
+    jacobian_ray,
+)
 PROGRAM = {f"camera.{function.__name__}": function for function in FUNCTIONS}

@@ -141,6 +141,20 @@ def lm_trace(
     return steps
 
 
+def covariance(J: Array, r: Array, wrong: str | None = None) -> Array:
+    m, n = J.shape
+    noise = {"divided-by-m": r @ r / m, "noise-of-one": 1.0}.get(wrong or "", r @ r / (m - n))
+    root = np.linalg.pinv(J)
+    C = noise * root @ root.T
+    return np.linalg.inv(C) if wrong == "information" else C
+
+
+def nielsen_factor(gain: float, wrong: str | None = None) -> float:
+    if wrong == "gain-not-bounded":
+        return 1 - (2 * gain - 1) ** 3
+    return max(1 / 3, 1 - (2 * min(gain, 1.0) - 1) ** (2 if wrong == "square-for-cube" else 3))
+
+
 # --- bundle adjustment
 
 
@@ -200,6 +214,8 @@ PROGRAM = {
     "least_squares.gauss_newton_step": gauss_newton_step,
     "least_squares.lm_step": lm_step,
     "least_squares.lm_trace": lm_trace,
+    "least_squares.covariance": covariance,
+    "least_squares.nielsen_factor": nielsen_factor,
     "bundle.residual": residual,
     "bundle.cost": bundle_cost,
     "bundle.schur": schur,

@@ -248,6 +248,13 @@ def se3_act(T: Array, x: Array, wrong: str | None = None) -> Array:
     return R @ (x + t) if wrong == "moved-first" else R @ x + t
 
 
+def se3_act_jacobian(pose: Array, x: Array, wrong: str | None = None) -> Array:
+    R, t = pose[:3, :3], pose[:3, 3]
+    if wrong == "right-perturbation":
+        return np.hstack([R, -R @ skew(x)])
+    return np.hstack([np.eye(3), -skew(x if wrong == "body-point" else R @ x + t)])
+
+
 def se3_adjoint(T: Array, wrong: str | None = None) -> Array:
     if wrong == "adjoint-of-inverse":
         return adjoint6(np.linalg.inv(T))
@@ -318,6 +325,18 @@ def sim3_adjoint(S: Array, wrong: str | None = None) -> Array:
     return A
 
 
+def sim3_left_jacobian(xi: Array, wrong: str | None = None) -> Array:
+    rho, phi, sigma = xi[:3], xi[3:6], xi[6]
+    ad = np.zeros((7, 7))
+    ad[:3, :3], ad[:3, 3:6], ad[:3, 6], ad[3:6, 3:6] = (
+        skew(phi) + sigma * np.eye(3),
+        skew(rho),
+        -rho,
+        skew(phi),
+    )
+    return group_jacobian(ad, wrong, phi)
+
+
 NAMES = {
     "so2": ("exp", "wrap"),
     "se2": ("exp", "log", "compose", "inverse", "adjoint", "left_jacobian"),
@@ -325,9 +344,9 @@ NAMES = {
     "quaternion": ("to_rotation", "from_rotation"),
     "se3": (
         *("exp", "log", "left_jacobian", "left_jacobian_inverse", "compose", "inverse", "act", "adjoint"),
-        "interpolate",
+        *("act_jacobian", "interpolate"),
     ),
-    "sim3": ("exp", "log", "compose", "inverse", "act", "adjoint"),
+    "sim3": ("exp", "log", "compose", "inverse", "act", "adjoint", "left_jacobian"),
 }
 PROGRAM = {
     f"{topic}.{name}": globals()[f"{topic}_{name}"] for topic, names in NAMES.items() for name in names

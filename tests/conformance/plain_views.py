@@ -71,6 +71,30 @@ def triangulate_optimal(T_cams: Array, params: Array, uv: Array, wrong: str | No
     return {"X": X, "covariance": H if wrong == "information" else np.linalg.inv(H)}
 
 
+def meeting(p_a: Array, b_a: Array, p_b: Array, b_b: Array, wrong: str | None = None) -> Array:
+    """Feet of the common perpendicular by the triple product."""
+    n = np.cross(b_a, b_b)
+    s = np.cross(p_b - p_a, b_b) @ n / (n @ n)
+    t = np.cross(p_b - p_a, b_a) @ n / (n @ n)
+    a, b = p_a + s * b_a, p_b + t * b_b
+    return a if wrong == "on-the-first-line" else (a + b) / 2
+
+
+def epipolar(F: Array, uv_a: Array, uv_b: Array, wrong: str | None = None) -> float:
+    F = F.T if wrong == "fundamental-transposed" else F
+    a, b = np.append(uv_a, 1), np.append(uv_b, 1)
+    length = {"other-image": np.hypot(*(F.T @ b)[:2]), "algebraic": 1.0}.get(
+        wrong or "", np.hypot(*(F @ a)[:2])
+    )
+    return float(b @ F @ a / length)
+
+
+def sampson(F: Array, uv_a: Array, uv_b: Array, wrong: str | None = None) -> float:
+    a, b = np.append(uv_a, 1), np.append(uv_b, 1)
+    in_a, in_b = np.hypot(*(F.T @ b)[:2]), np.hypot(*(F @ a)[:2])
+    return float(b @ F @ a / {"one-image": in_b, "algebraic": 1.0}.get(wrong or "", np.hypot(in_a, in_b)))
+
+
 # --- poses
 
 
@@ -176,6 +200,18 @@ def align(source: Array, target: Array, with_scale: bool, wrong: str | None = No
     return {"scale": s, "R": R, "t": b - (1.0 if wrong == "translation-not-scaled" else s) * R @ a}
 
 
+def alignment_error(source: Array, target: Array, with_scale: bool, wrong: str | None = None) -> float:
+    S = align(source, target, with_scale)
+    e = np.linalg.norm(S["scale"] * source @ S["R"].T + S["t"] - target, axis=1)
+    if wrong == "mean-for-root-mean-square":
+        return float(e.mean())
+    return float(np.sqrt(np.sum(e**2) / (1 if wrong == "sum-not-divided" else len(e))))
+
+
+def pose_from_centre(R_cam_world: Array, p_world: Array, wrong: str | None = None) -> Array:
+    return rigid(R_cam_world, p_world if wrong == "centre-for-translation" else -R_cam_world @ p_world)
+
+
 def ate(estimate: Array, truth: Array, align: str, wrong: str | None = None) -> Any:
     mode = {"scale-fixed": "se3", "scale-freed": "sim3"}.get(wrong or "", align)
     if wrong == "truth-aligned":
@@ -274,6 +310,11 @@ PROGRAM = {
     "multiview.p3p": p3p,
     "multiview.essential": essential,
     "multiview.umeyama": align,
+    "multiview.alignment_error": alignment_error,
+    "multiview.pose_from_centre": pose_from_centre,
+    "multiview.midpoint": meeting,
+    "multiview.epipolar_distance": epipolar,
+    "multiview.sampson_distance": sampson,
     "multiview.camera_from_world": camera_from_world,
     "trajectory.ate": ate,
     "trajectory.rpe": rpe,

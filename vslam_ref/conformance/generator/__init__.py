@@ -26,6 +26,7 @@ HELPERS = (
     "groups",
     "lenses",
     "lens_slopes",
+    "pairs",
     "similarity",
     "views",
 )

@@ -10,7 +10,7 @@ from mpmath import mpf
 
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact import floats, vector
-from vslam_ref.conformance.generator.lens_slopes import SLOPES, in_intrinsics, in_point, jacobians
+from vslam_ref.conformance.generator.lens_slopes import SLOPES, in_intrinsics, in_pixel, in_point, jacobians
 from vslam_ref.conformance.generator.lenses import (
     EQUATIONS,
     LENSES,
@@ -56,6 +56,8 @@ NOTES = {
     ),
     "not-unit": ("your ray has z = 1; a bearing has length 1", "(x, y, 1)"),
     "not-undistorted": ("your ray is that of the pinhole", "((u - cx)/fx, (v - cy)/fy, 1) / length"),
+    "ray-not-unit": ("your ray's Jacobian is that of (x, y, 1), not of the unit bearing", "d(x, y, 1)/du"),
+    "ideal-ray": ("your ray's Jacobian leaves out the lens", "that of the pinhole"),
     "depth-column-sign": ("the depth's column of your Jacobian has the wrong sign", "+x/z^2 for -x/z^2"),
     "depth-not-divided": ("your Jacobian is that at depth 1: it lacks the factor 1/z", "dh/d(x/z)"),
     "ideal-jacobian": (
@@ -89,6 +91,8 @@ def build(rng: np.random.Generator) -> Topic:
         _unproject(topic, rng, model)
         jacobians(topic, rng, model)
     _zero_omega(topic, rng)
+    for model in LENSES:
+        in_pixel(topic, rng, model)
     return topic
 
 

@@ -27,6 +27,11 @@ NOTES = {
     "not-damped": ("your step is not damped", "J^T J step = -J^T r"),
     "always-taken": ("you take a step although the cost rises", "b <- b + step, always"),
     "cost-not-halved": ("your cost is |r|^2; it is half of it", "|r|^2"),
+    "divided-by-m": ("you divide by the number of residuals; m - n is wanted", "|r|^2/m (J^T J)^-1"),
+    "noise-of-one": ("you leave out the noise: your covariance is for residuals of variance 1", "(J^T J)^-1"),
+    "information": ("your covariance is its inverse", "J^T J (m - n)/|r|^2"),
+    "gain-not-bounded": ("you do not bound the gain by 1: the factor falls below 1/3", "1 - (2 gain - 1)^3"),
+    "square-for-cube": ("you square where Nielsen takes the cube", "max(1/3, 1 - (2 gain - 1)^2)"),
     "damping-late": ("you use each damping one step too late", "lambda of the step before"),
 }
 
@@ -73,6 +78,15 @@ def build(rng: np.random.Generator) -> Topic:
         cases = [_trace(rng, damping) for _ in range(4)]
         oracle = "straight-line Levenberg-Marquardt in 50 digits"
         topic.group("least_squares.lm_trace", "eq-damped", oracle, long, cases, flags=("trace", flag))
+    cases = [
+        _covariance(*_system(rng, int(rng.integers(5, 9)), int(rng.integers(2, 4)), 10.0)) for _ in range(10)
+    ]
+    topic.group("least_squares.covariance", "eq-covariance", "inverse in 50 digits", fine, cases)
+    cases = [
+        _nielsen(float(g)) for g in [*rng.uniform(0.0, 1.0, 6), *rng.uniform(1.05, 2.0, 3), 0.5, 1.0, 1e-3]
+    ]
+    simple = tolerance(2e-15, "four operations")
+    topic.group("least_squares.nielsen_factor", "eq-nielsen", "definition, 50 digits", simple, cases)
     return topic
 
 
@@ -145,6 +159,30 @@ def _damped(J: Array, r: Array, damping: float, rng: np.random.Generator) -> dic
 def _case(inputs: dict[str, Any], step: Any, wrong: dict[str, Any]) -> dict[str, Any]:
     mistakes = {note: {"step": floats(column(s))} for note, s in wrong.items()}
     return {"inputs": inputs, "expected": {"step": floats(column(step))}, "mistakes": mistakes}
+
+
+def _covariance(J: Array, r: Array) -> dict[str, Any]:
+    A, m, n = matrix(J), len(r), J.shape[1]
+    total = sum(v * v for v in vector(r))
+    inverse = (A.T * A) ** -1
+    right = inverse * (total / (m - n))
+    wrong = {"divided-by-m": inverse * (total / m), "noise-of-one": inverse, "information": right**-1}
+    mistakes = {note: {"cov": floats(C)} for note, C in wrong.items()}
+    return {"inputs": {"J": J, "r": r}, "expected": {"cov": floats(right)}, "mistakes": mistakes}
+
+
+def _nielsen(gain: float) -> dict[str, Any]:
+    g = mpf(gain)
+    right = max(mpf(1) / 3, 1 - (2 * min(g, mpf(1)) - 1) ** 3)
+    wrong = {
+        "gain-not-bounded": 1 - (2 * g - 1) ** 3,
+        "square-for-cube": max(mpf(1) / 3, 1 - (2 * min(g, mpf(1)) - 1) ** 2),
+    }
+    mistakes: dict[str, Any] = {}
+    for note, v in wrong.items():
+        if abs(v - right) > 1e-6 and {"factor": float(v)} not in mistakes.values():
+            mistakes[note] = {"factor": float(v)}
+    return {"inputs": {"gain": gain}, "expected": {"factor": float(right)}, "mistakes": mistakes}
 
 
 def _trace(rng: np.random.Generator, damping: list[float]) -> dict[str, Any]:

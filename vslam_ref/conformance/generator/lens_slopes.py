@@ -18,6 +18,7 @@ from vslam_ref.conformance.generator.lenses import (
     jacobian_point,
     project,
     ray,
+    unproject,
 )
 
 SLOPES = "central differences of the definition, 50 digits, h = 1e-15"
@@ -67,6 +68,29 @@ def in_point(model: str, params: Array, X: Array) -> dict[str, Any]:
     if model != "pinhole" and mpmath.mnorm(ideal - J) > 1e-3:
         wrong["ideal-jacobian"] = ideal
     return _matrix({"model": model, "params": params, "X_cam": X}, J, wrong)
+
+
+def in_pixel(topic: Topic, rng: np.random.Generator, model: str) -> None:
+    """Jacobian of the bearing in the pixel: differences of Newton's solutions."""
+    reason = "the inverse of a Jacobian of condition below 30, times some fifty operations"
+    rule = tolerance(1e-13, reason, float32=1e-3)
+    cases = []
+    for _ in range(4):
+        params, X = camera(rng, model), ray(rng, 0.05, 0.6)
+        k = vector(params)
+        uv = np.array(floats(project(model, k, vector(X))))
+
+        def plane(at: Any, model: str = model, k: Any = k, X: Any = X) -> list[Any]:
+            b = unproject(model, k, at, X)
+            return [b[0] / b[2], b[1] / b[2], mpf(1)]
+
+        u = vector(uv)
+        J = derivative(lambda at, k=k, X=X: unproject(model, k, at, X), u)
+        wrong = {"ray-not-unit": derivative(plane, u)}
+        if model != "pinhole":
+            wrong["ideal-ray"] = derivative(lambda at, k=k, X=X: unproject("pinhole", k[:4], at, X), u)
+        cases.append(_matrix({"model": model, "params": params, "uv": uv}, J, wrong))
+    topic.group("camera.jacobian_ray", "eq-jacobian-ray", SLOPES, rule, cases, flags=(model,))
 
 
 def in_intrinsics(model: str, params: Array, X: Array) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from vslam_ref.conformance.generator import similarity
 from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact import column, floats, hat, matrix, vector
 from vslam_ref.conformance.generator.groups import motion, turned
+from vslam_ref.conformance.generator.pairs import pair_groups
 from vslam_ref.conformance.generator.se3 import case
 from vslam_ref.conformance.generator.similarity import Similarity
 from vslam_ref.conformance.generator.views import (
@@ -48,6 +49,16 @@ NOTES = {
         "you keep solutions with a point behind the camera, on the other side of its ray",
         "distances of either sign",
     ),
+    "other-image": (
+        "you measure the distance in image a; image b is asked for",
+        "x_b^T F x_a / |(F^T x_b)_12|",
+    ),
+    "algebraic": ("you answer u_b^T F u_a; it must be divided by the length of its gradient", "u_b^T F u_a"),
+    "one-image": ("your gradient is that in one image only", "u_b^T F u_a / |(F u_a)_12|"),
+    "fundamental-transposed": ("your matrix relates the images the other way round", "u_a^T F u_b"),
+    "on-the-first-line": ("your point lies on the first line, nearest to the second", "p_a + s b_a"),
+    "mean-for-root-mean-square": ("you take the mean distance; its root mean square is wanted", "mean |e|"),
+    "sum-not-divided": ("you do not divide by the number of points", "(sum |e|^2)^(1/2)"),
     "factors-swapped": ("your essential matrix is R hat(t); hat(t) must stand on the left", "R hat(t)"),
     "other-way-round": ("your essential matrix is the transposed one: x_a^T E x_b = 0", "E^T"),
     "element-wise": ("you multiply entry by entry: * between arrays for @", "hat(t) * R"),
@@ -95,6 +106,15 @@ def build(rng: np.random.Generator) -> Topic:
             cases = [_umeyama(rng, flag, with_scale) for _ in range(6 if with_scale else 4)]
             flags = (flag, "sim3" if with_scale else "se3")
             topic.group("multiview.umeyama", "eq-umeyama", oracle, rule, cases, flags=flags)
+    pair_groups(topic, rng)
+    fine = tolerance(1e-14, "a dozen operations")
+    cases = [_pose_from_centre(motion(rng)[:3, :3], rng.uniform(-3, 3, 3)) for _ in range(6)]
+    topic.group("multiview.pose_from_centre", "eq-centre", "definition, 50 digits", fine, cases)
+    oracle = "Horn's quaternion: largest eigenvector of a 4 x 4 matrix, 50 digits"
+    for with_scale in (True, False):
+        cases = [_alignment_error(rng, with_scale) for _ in range(6)]
+        flags = ("sim3" if with_scale else "se3",)
+        topic.group("multiview.alignment_error", "eq-umeyama", oracle, rule, cases, flags=flags)
     return topic
 
 
@@ -197,3 +217,31 @@ def _umeyama(rng: np.random.Generator, flag: str, with_scale: bool) -> dict[str,
 
 def _answer(S: Similarity) -> dict[str, Any]:
     return {"scale": float(S.scale), "R": floats(S.R), "t": floats(S.t)}
+
+
+def _pose_from_centre(R: Array, p: Array) -> dict[str, Any]:
+    M, t = matrix(R), -(matrix(R) * mpmath.matrix(vector(p)))
+    right, wrong = mpmath.eye(4), mpmath.eye(4)
+    right[0:3, 0:3] = wrong[0:3, 0:3] = M
+    for i in range(3):
+        right[i, 3], wrong[i, 3] = t[i], mpf(p[i])
+    inputs = {"R_cam_world": R, "p_world": p}
+    return case(inputs, "pose", right, {"centre-for-translation": {"pose": wrong}})
+
+
+def _alignment_error(rng: np.random.Generator, with_scale: bool) -> dict[str, Any]:
+    n = int(rng.integers(5, 9))
+    source, T = rng.uniform(-3, 3, (n, 3)), motion(rng)
+    target = (
+        (1.7 if with_scale else 1.0) * source @ T[:3, :3].T + T[:3, 3] + 0.2 * rng.standard_normal((n, 3))
+    )
+    S = similarity.align(source, target, with_scale=with_scale)
+    pairs = zip(similarity.rows(source), similarity.rows(target), strict=True)
+    e = [mpmath.norm(mpmath.matrix([a - b for a, b in zip(S.act(x), y, strict=True)])) for x, y in pairs]
+    total = sum(v * v for v in e)
+    wrong = {
+        "mean-for-root-mean-square": {"rmse": sum(e) / n},
+        "sum-not-divided": {"rmse": mpmath.sqrt(total)},
+    }
+    inputs = {"source": source, "target": target, "with_scale": with_scale}
+    return case(inputs, "rmse", mpmath.sqrt(total / n), wrong)

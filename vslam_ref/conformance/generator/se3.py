@@ -10,7 +10,7 @@ from mpmath import mpf
 
 from vslam_ref.conformance.generator import exact
 from vslam_ref.conformance.generator.building import Topic, tolerance
-from vslam_ref.conformance.generator.exact import column, floats, matrix, vector
+from vslam_ref.conformance.generator.exact import column, derivative, floats, matrix, vector
 from vslam_ref.conformance.generator.groups import (
     REGIMES,
     SE3,
@@ -48,6 +48,8 @@ NOTES = {
     "transposed": ("your inverse is the transposed 4 x 4 matrix", "T^T"),
     "turned-back": ("your action turns by R^T", "R^T x + t"),
     "moved-first": ("your action adds the translation before it turns", "R (x + t)"),
+    "right-perturbation": ("your pose is perturbed on the right, T Exp(xi)", "[R, -R hat(x)]"),
+    "body-point": ("your rotation columns use the point before the motion", "[I, -hat(x)]"),
     "adjoint-block": ("the upper right block of your adjoint is R hat(t)", "R hat(t) for hat(t) R"),
     "adjoint-of-inverse": ("your adjoint is that of the inverse motion", "Ad(T^-1)"),
     "straight-line": (
@@ -88,6 +90,9 @@ def build(rng: np.random.Generator) -> Topic:
         flags = () if flag == "generic" else (flag,)
         cases = [_between(motion(rng), twist(rng, flag), float(rng.uniform(0.1, 0.9))) for _ in range(8)]
         topic.group("se3.interpolate", "eq-exp-rigid", SERIES, near, cases, flags=flags)
+    cases = [_act_jacobian(motion(rng), shift(rng)) for _ in range(8)]
+    oracle = "central differences of the series, 50 digits"
+    topic.group("se3.act_jacobian", "eq-act-jacobian", oracle, fine, cases)
     return topic
 
 
@@ -166,6 +171,15 @@ def _act(T: Array, x: Array) -> dict[str, Any]:
     R, t, v = matrix(T[:3, :3]), mpmath.matrix(vector(T[:3, 3])), mpmath.matrix(vector(x))
     wrong = {"turned-back": {"x": column(R.T * v + t)}, "moved-first": {"x": column(R * (v + t))}}
     return case({"T": T, "x": x}, "x", column(R * v + t), wrong)
+
+
+def _act_jacobian(T: Array, x: Array) -> dict[str, Any]:
+    M, v, zero = matrix(T), mpmath.matrix([*vector(x), 1]), [mpf(0)] * 6
+    J = derivative(lambda xi: list(SE3.exp(xi) * M * v)[:3], zero)
+    right = derivative(lambda xi: list(M * SE3.exp(xi) * v)[:3], zero)
+    body = derivative(lambda xi: list(SE3.exp(xi) * v)[:3], zero)
+    wrong = {"right-perturbation": {"J": right}, "body-point": {"J": body}}
+    return case({"pose": T, "x": x}, "J", J, wrong)
 
 
 def _adjoint(T: Array) -> dict[str, Any]:

@@ -29,6 +29,11 @@ NOTES = {
     "translation-scaled": ("your action scales the translation as well", "s (R x + t)"),
     "wrong-order": ("your product is S_b S_a", "S_b S_a"),
     "rotation-not-scaled": ("the upper left block of your adjoint lacks the scale", "R for s R"),
+    "right-jacobian": ("your left Jacobian is the right one", "J(-xi)"),
+    "small-angle-sign": (
+        "your branch for small vectors has the sign of the right Jacobian",
+        "I - ad(xi)/2 for I + ad(xi)/2",
+    ),
     "adjoint-sign": ("the scale's column of your adjoint has the wrong sign", "+t for -t"),
 }
 
@@ -63,6 +68,12 @@ def build(rng: np.random.Generator) -> Topic:
     topic.group("sim3.act", "eq-exp-similarity", "50-digit product", fine, cases)
     cases = [_adjoint(S) for S in some[:10]]
     topic.group("sim3.adjoint", "eq-adjoint-similarity", "conjugated generators, 50 digits", fine, cases)
+    for flag in ("generic", "small_angle", "near_pi"):
+        cases = [_left_jacobian(_twist(rng, flag)) for _ in range(5)]
+        flags = () if flag == "generic" else (flag,)
+        topic.group("sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=flags)
+    cases = [_left_jacobian(1e-4 * _twist(rng, "generic"), small=True) for _ in range(4)]
+    topic.group("sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=("tiny",))
     return topic
 
 
@@ -129,6 +140,14 @@ def _act(S: Array, x: Array) -> dict[str, Any]:
     return case(
         {"S": S, "x": x}, "x", column(M * v + t), {"translation-scaled": {"x": column(M * v + s * t)}}
     )
+
+
+def _left_jacobian(xi: Array, small: bool = False) -> dict[str, Any]:
+    x = vector(xi)
+    wrong = {"right-jacobian": {"J": SIM3.left_jacobian([-v for v in x])}}
+    if small:
+        wrong = {"small-angle-sign": {"J": mpmath.eye(7) - SIM3.ad(x) / 2}}
+    return case({"xi": xi}, "J", SIM3.left_jacobian(x), wrong)
 
 
 def _adjoint(S: Array) -> dict[str, Any]:

@@ -38,6 +38,9 @@ def _jacobian_rig(model: str, params: Array, T_cam_rig: Array, pose: Array, X_wo
 TABLE: Answers = {
     "camera.project": _project,
     "camera.unproject": _unproject,
+    "camera.jacobian_ray": lambda model, params, uv: (
+        camera(model, params).unproject_with_jacobians(uv).J_pixel
+    ),
     "camera.jacobian_point": lambda model, params, X_cam: (
         camera(model, params).project_with_jacobians(X_cam).J_point
     ),

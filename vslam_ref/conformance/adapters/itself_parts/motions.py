@@ -29,6 +29,8 @@ TABLE: Answers = {
     "sim3.inverse": lambda S: sim3.inverse(S),
     "sim3.act": lambda S, x: sim3.act(S, x),
     "sim3.adjoint": lambda S: sim3.adjoint(S),
+    "sim3.left_jacobian": lambda xi: sim3.left_jacobian(xi),
+    "se3.act_jacobian": lambda pose, x: se3.act_with_jacobians(pose, x)[1],
     "so2.exp": lambda angle: so2.exp(angle),
     "so2.wrap": lambda angle: so2.wrap(angle),
     **{f"se2.{name}": getattr(se2, name) for name in ("exp", "compose", "left_jacobian")},

@@ -9,9 +9,14 @@ from numpy.typing import NDArray
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.estimation.resection import resect
 from vslam_ref.geometry.alignment import align
-from vslam_ref.geometry.camera_pose import camera_from_world
+from vslam_ref.geometry.camera_pose import camera_from_world, pose_from_centre
 from vslam_ref.geometry.cameras import Pinhole
-from vslam_ref.geometry.multiview.epipolar import essential_from_motion
+from vslam_ref.geometry.multiview.closest_point import midpoint
+from vslam_ref.geometry.multiview.epipolar import (
+    epipolar_distance,
+    essential_from_motion,
+    sampson_distance,
+)
 from vslam_ref.geometry.multiview.point_state import PointState
 from vslam_ref.geometry.multiview.three_points import p3p
 from vslam_ref.geometry.multiview.triangulation import triangulate, triangulate_linear
@@ -68,6 +73,13 @@ TABLE: Answers = {
     "multiview.p3p": _p3p,
     "multiview.essential": lambda T_b_a: essential_from_motion(T_b_a),
     "multiview.umeyama": _umeyama,
+    "multiview.alignment_error": lambda source, target, with_scale: (
+        align(source, target, with_scale=bool(with_scale)).rmse
+    ),
+    "multiview.pose_from_centre": lambda R_cam_world, p_world: pose_from_centre(R_cam_world, p_world),
+    "multiview.epipolar_distance": lambda F, uv_a, uv_b: epipolar_distance(F, uv_a, uv_b),
+    "multiview.sampson_distance": lambda F, uv_a, uv_b: sampson_distance(F, uv_a, uv_b),
+    "multiview.midpoint": lambda p_a, b_a, p_b, b_b: midpoint(p_a, b_a, p_b, b_b),
     "multiview.camera_from_world": lambda R_cam_world, p_world, X_world: camera_from_world(
         R_cam_world, p_world, X_world
     ),

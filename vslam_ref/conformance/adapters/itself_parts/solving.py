@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.estimation.least_squares import Options, minimise
-from vslam_ref.estimation.least_squares.damping import DampingState
-from vslam_ref.estimation.least_squares.linear import damped_step
+from vslam_ref.estimation.least_squares.damping import DampingState, gain_factor
+from vslam_ref.estimation.least_squares.linear import covariance, damped_step
 
 Array = NDArray[Any]
 
@@ -67,8 +67,17 @@ def _trace(y: Array, t: Array, start: Array, damping: Array) -> list[dict[str, A
     return steps
 
 
+def _covariance(J: Array, r: Array) -> Array:
+    found = covariance(J, r)
+    if found.matrix is None:
+        raise ValueError(found.reason)
+    return found.matrix
+
+
 TABLE: Answers = {
     "least_squares.gauss_newton_step": lambda J, r: _step(J, r),
     "least_squares.lm_step": _step,
     "least_squares.lm_trace": _trace,
+    "least_squares.covariance": _covariance,
+    "least_squares.nielsen_factor": lambda gain: gain_factor(gain),
 }
