@@ -25,7 +25,18 @@ from types import ModuleType
 from typing import NoReturn
 
 import vslam_ref
-from vslam_ref.commands import ba, bench, calibrate, data, evaluate, grid, reproduce, vectors, verify, warm_cache
+from vslam_ref.commands import (
+    ba,
+    bench,
+    calibrate,
+    data,
+    evaluate,
+    grid,
+    reproduce,
+    vectors,
+    verify,
+    warm_cache,
+)
 from vslam_ref.commands import list as list_command
 from vslam_ref.commands import run as run_command
 

@@ -109,7 +109,7 @@ def _mutants(options: argparse.Namespace) -> int:
     run_by, unseen = len(found.functions), len(found.unseen)
     print(f"functions that cite an equation: {run_by} are run by the vectors, {unseen} are not")
     noticed = f"{found.killed} of {len(found.sample)} mutants noticed ({100 * share:.1f} %)"
-    print(f"{noticed}, of {found.possible} possible")
+    print(f"{noticed}, of {found.possible} possible; {found.unreached} stand in lines that no vector runs")
     if target is not None:
         import json
 

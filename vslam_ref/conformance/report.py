@@ -25,7 +25,8 @@ def page(report: Report) -> str:
     parts = [
         f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Verification of {name}</title>",
         f"<style>{STYLE}</style><h1>Verification of <code>{name}</code></h1>",
-        f"<p class='{mark}'><strong>{word}</strong>: {numbers['passed']} passed, {numbers['failed']} failed,\n",
+        f"<p class='{mark}'><strong>{word}</strong>: {numbers['passed']} passed, ",
+        f"{numbers['failed']} failed, ",
         f"{numbers['errors']} without a usable reply, {numbers['unsupported']} not supported.</p>",
         _chapters(numbers["by_chapter"]),
         _causes(numbers["diagnoses"]),

@@ -75,10 +75,10 @@ def in_a_child(work: Callable[[], str], seconds: float) -> str:
         try:
             os.close(receive)
             signal.alarm(max(1, int(seconds)))
-            os.write(send, work().encode()[:60_000])
+            _write(send, work())
             status = 0
         except BaseException as error:  # whatever it is, the mutant did not pass
-            os.write(send, f"!{type(error).__name__}: {error}".encode()[:4000])
+            _write(send, f"!{type(error).__name__}: {error}"[:4000])
         finally:
             os._exit(status)
     os.close(send)
@@ -88,6 +88,12 @@ def in_a_child(work: Callable[[], str], seconds: float) -> str:
     os.close(receive)
     _, status = os.waitpid(child, 0)
     return text.decode() if text else f"!ended with status {status}"
+
+
+def _write(pipe: int, text: str) -> None:
+    data = text.encode()
+    while data:
+        data = data[os.write(pipe, data) :]
 
 
 def run_mutant(mutant: Mutant, names: Sequence[str], seconds: float) -> Verdict:
@@ -126,26 +132,33 @@ def _first_failure(names: Sequence[str]) -> str:
     return "passed"
 
 
-def executed(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Module and function of everything in the library that the vectors run, found by a tracer in a child."""
+def executed(names: Sequence[str]) -> set[tuple[str, int]]:
+    """Module and line of everything in the library that the vectors run, found by a tracer in a child.
+
+    A statement over several lines is told by each line on which a part of it begins.
+    """
 
     def work() -> str:
         os.environ["VSLAM_REF_BACKEND"] = "numpy"
-        found: set[tuple[str, str]] = set()
+        found: set[tuple[str, int]] = set()
 
-        def trace(frame: Any, event: str, argument: Any) -> None:
+        def trace(frame: Any, event: str, argument: Any) -> Any:
             module = frame.f_globals.get("__name__", "")
-            if event == "call" and module.startswith("vslam_ref."):
-                found.add((module, frame.f_code.co_qualname))
+            if not module.startswith("vslam_ref.") or module.startswith("vslam_ref.conformance"):
+                return None
+            if event == "line":
+                found.add((module, frame.f_lineno))
+            return trace
 
-        sys.setprofile(trace)
+        sys.settrace(trace)
         told = _first_failure(names)
-        sys.setprofile(None)
+        sys.settrace(None)
         if told != "passed":
             raise AssertionError(f"the library itself fails {told}")
-        return "\n".join(f"{module} {function}" for module, function in sorted(found))
+        return "\n".join(f"{module} {line}" for module, line in sorted(found))
 
     told = in_a_child(work, 600.0)
     if told.startswith("!"):
         raise ValueError(f"the vectors could not be run: {told[1:]}")
-    return [(line.split()[0], line.split()[1]) for line in told.splitlines()]
+    pairs = (line.split() for line in told.splitlines())
+    return {(module, int(number)) for module, number in pairs}

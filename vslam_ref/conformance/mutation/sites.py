@@ -1,8 +1,8 @@
 """Where a function can be changed, and how.
 
 Only what computes is changed: not documentation, annotations, default values, messages, nor the checks that
-lead to them.  A comparison is not changed either: which branch of a series is taken near its threshold makes
-no difference that anybody could see.
+lead to them.  Nothing inside a comparison is changed either: where a series takes over near its
+threshold, or how small a singular value counts as zero, makes no difference that anybody could see.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 SWAPPED_CALLS = {"sin": "cos", "cos": "sin", "minimum": "maximum", "maximum": "minimum", "tan": "sin"}
 TRANSPOSING = ("transpose", "swapaxes")
+LEFT_ALONE = (ast.Raise, ast.Assert, ast.JoinedStr, ast.With, ast.ImportFrom, ast.Import, ast.Compare)
 
 
 class Mutant(NamedTuple):
@@ -90,7 +91,9 @@ def _computing(function: ast.FunctionDef) -> Iterator[ast.AST]:
 
 
 def _walk(node: ast.AST) -> Iterator[ast.AST]:
-    if isinstance(node, ast.Raise | ast.Assert | ast.JoinedStr | ast.With | ast.ImportFrom | ast.Import):
+    if isinstance(
+        node, ast.Raise | ast.Assert | ast.JoinedStr | ast.With | ast.ImportFrom | ast.Import | ast.Compare
+    ):
         return
     if isinstance(node, ast.If) and all(isinstance(s, ast.Raise) for s in node.body):
         for statement in node.orelse:
