@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from plain_cameras import pixel
+from plain_cameras import jacobian_point, pixel
+from plain_motions import skew
 from scipy.stats import norm
 
 Array = Any
@@ -185,6 +186,30 @@ def bundle_cost(
     return float(squares.sum() if wrong == "not-halved" else 0.5 * squares.sum())
 
 
+def normal_equations(
+    model: str, params: Array, pose: Array, X_world: Array, uv: Array, cov: Array, wrong: str | None = None
+) -> Any:
+    R, t = pose[:3, :3], pose[:3, 3]
+    rows, points, r = [], [], []
+    for X, u in zip(X_world, uv, strict=True):
+        inner = jacobian_point(model, params, R @ X + t)
+        side = (R, X) if wrong == "right-perturbation" else (np.eye(3), R @ X + t)
+        rows.append(np.hstack([inner @ side[0], -inner @ side[0] @ skew(side[1])]))
+        points.append(inner @ R)
+        r.append(residual(model, params, pose, X, u))
+    weights = {"covariance-not-inverted": cov, "covariance-ignored": np.tile(np.eye(2), (len(cov), 1, 1))}
+    A = weights.get(wrong or "", np.linalg.inv(cov))
+    J, K, e = np.array(rows), np.array(points), np.array(r)
+    sign = -1 if wrong == "gradient-sign" else 1
+    return {
+        "B": np.einsum("nai,nab,nbj->ij", J, A, J),
+        "W_T": np.einsum("nai,nab,nbj->nij", K, A, J).reshape(-1, 6),
+        "C": np.einsum("nai,nab,nbj->nij", K, A, K),
+        "g_view": sign * np.einsum("nai,nab,nb->i", J, A, e)[None],
+        "g_point": sign * np.einsum("nai,nab,nb->ni", K, A, e).ravel(),
+    }
+
+
 def inverse_blocks(C: Array, wrong: str | None) -> Array:
     blocks = {"c-not-inverted": C, "element-wise": 1 / C}.get(wrong or "", np.linalg.inv(C))
     big = np.zeros((3 * len(C), 3 * len(C)))
@@ -218,6 +243,7 @@ PROGRAM = {
     "least_squares.nielsen_factor": nielsen_factor,
     "bundle.residual": residual,
     "bundle.cost": bundle_cost,
+    "bundle.normal_equations": normal_equations,
     "bundle.schur": schur,
     "bundle.back_substitute": back_substitute,
 }

@@ -7,11 +7,14 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import plain_estimates
+import plain_motions
 import plain_views
 import pytest
 
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.adapters.table import plain
+from vslam_ref.conformance.catalogue import Function
 from vslam_ref.conformance.compare import compare, numbers
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.program import InProcess
@@ -106,3 +109,38 @@ def test_a_program_with_poses_of_the_body_in_the_world_passes() -> None:
     file = file._replace(cases=[c for c in file.cases if c.function in table])
     assert run(InProcess(module), [file], Convention(transform="world_from_cam")).passed
     assert not run(InProcess(module), [file]).passed
+
+
+def test_normal_equations_of_a_right_perturbation_with_rotations_first_are_turned_home() -> None:
+    """xi = Ad_T eta for T <- T Exp(eta): H becomes M^T H M, gradients and cross blocks follow."""
+    order = [3, 4, 5, 0, 1, 2]
+
+    def answer(function: str, inputs: dict[str, Any]) -> Any:
+        given = {name: value if isinstance(value, str) else numbers(value) for name, value in inputs.items()}
+        found = plain_estimates.normal_equations(**given, wrong="right-perturbation")
+        found["B"] = found["B"][order][:, order]
+        return plain({**found, **{name: found[name][:, order] for name in ("W_T", "g_view")}})
+
+    module = ModuleType("right")
+    module.answer = answer  # type: ignore[attr-defined]
+    file = form.load("06/bundle.json")
+    file = file._replace(cases=[c for c in file.cases if c.function == "bundle.normal_equations"])
+    both = Convention(perturbation="right", tangent_order="rotation_first")
+    assert run(InProcess(module), [file], both).passed
+    for one in (Convention(), Convention(perturbation="right"), Convention(tangent_order="rotation_first")):
+        assert run(InProcess(module), [file], one).count("failed") == len(file.cases)
+
+
+def test_every_kind_goes_out_and_comes_home() -> None:
+    """What a convention does to an information matrix, its way back undoes."""
+    function = Function("x.y", 6, {"pose": "pose", "H": "pose_information"}, {"H": "pose_information"}, "")
+    rng = np.random.default_rng(3)
+    A, pose = rng.standard_normal((6, 6)), plain_motions.se3_exp(rng.standard_normal(6))
+    given = {"pose": pose.tolist(), "H": (A @ A.T).tolist()}
+    away = Convention("world_from_cam", "left", "rotation_first")
+    sent = away.inputs(function, given)
+    assert np.abs(np.array(sent["H"]) - given["H"]).max() > 0.1
+    home = away.outputs(function, {"H": sent["H"]}, given)["H"]
+    assert (
+        np.abs(np.array(home) - given["H"]).max() < 1e-12
+    )  # a product there and back, of order 10

@@ -19,7 +19,7 @@ T_world_cam         left          (Exp(eta) T^-1)^-1         -Ad_T eta
 ==================  ============  =========================  =================
 
 With xi = M eta, a Jacobian is J_program = J M, and a covariance M P_program M^T = P
-(:eq:`eq-convention-tangent` and the two after it, chapter 24).
+(:eq:`eq-convention-tangent` and the two after it, chapter 24).  An information H becomes M^T H M.
 """
 
 from __future__ import annotations
@@ -103,8 +103,10 @@ class Convention:
         M = self._from_program(inputs)
         if kind == "pose_jacobian":
             return (x @ M)[..., self._order(kind)].tolist()
-        back = np.linalg.inv(M)
         order = self._order(kind)
+        if kind == "pose_information":
+            return (np.swapaxes(M, -1, -2) @ x @ M)[..., order, :][..., order].tolist()
+        back = np.linalg.inv(M)
         return (back @ x @ np.swapaxes(back, -1, -2))[..., order, :][..., order].tolist()
 
     def _home(self, kind: str, value: Any, inputs: Mapping[str, Any]) -> Any:
@@ -133,6 +135,9 @@ class Convention:
         M = self._from_program(inputs)
         if kind == "pose_jacobian":
             return (x[..., back] @ np.linalg.inv(M)).tolist()
+        if kind == "pose_information":
+            away = np.linalg.inv(M)
+            return (np.swapaxes(away, -1, -2) @ x[..., back, :][..., back] @ away).tolist()
         return (M @ x[..., back, :][..., back] @ np.swapaxes(M, -1, -2)).tolist()
 
     def _unchanged(self, kind: str) -> bool:
@@ -148,6 +153,7 @@ class Convention:
             "tangent": self.tangent_order == plain.tangent_order,
             "pose_jacobian": False,
             "pose_covariance": False,
+            "pose_information": False,
         }
         return same.get("tangent" if kind.startswith("tangent") else kind, True)
 

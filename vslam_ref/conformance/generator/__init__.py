@@ -27,6 +27,7 @@ HELPERS = (
     "lenses",
     "lens_slopes",
     "pairs",
+    "normal",
     "similarity",
     "views",
 )

@@ -13,6 +13,7 @@ from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact import column, floats, matrix, vector
 from vslam_ref.conformance.generator.groups import motion
 from vslam_ref.conformance.generator.lenses import LENSES, camera, project, ray
+from vslam_ref.conformance.generator.normal import normal_case
 
 TOPIC, CHAPTER = "bundle", 6
 Array = NDArray[np.float64]
@@ -36,6 +37,11 @@ NOTES = {
         "1/2 sum e^T cov_0^-1 e",
     ),
     "covariance-ignored": ("your cost ignores the covariances", "1/2 sum e^T e"),
+    "right-perturbation": ("your pose is perturbed on the right, T Exp(xi)", "M^T B M with M = Ad(T)"),
+    "gradient-sign": (
+        "your gradients have the wrong sign: residuals are predicted minus measured",
+        "-J^T cov^-1 r",
+    ),
     "schur-sign": ("your Schur complement adds where it must subtract", "B + W C^-1 W^T"),
     "rhs-sign": ("the right side has the wrong sign of its second part", "-g_view - W C^-1 g_point"),
     "c-not-inverted": ("you multiply by C; its inverse is wanted", "B - W C W^T"),
@@ -75,6 +81,17 @@ def build(rng: np.random.Generator) -> Topic:
         topic.group("bundle.schur", "eq-schur", oracle, rule, [_schur(*s) for s in some], flags=flags)
         cases = [_back(rng, *s) for s in some]
         topic.group("bundle.back_substitute", "eq-back-substitution", oracle, rule, cases, flags=flags)
+    blocks = [
+        (model, normal_case(rng, model))
+        for model in ("pinhole", "radtan", "fisheye", "fov")
+        for _ in range(3)
+    ]
+    reason = "sums of products of Jacobians and residuals, the latter from pixels of some hundreds"
+    rule = tolerance(1e-11, reason, float32=1e-2)
+    oracle = "central differences of the definition, 50 digits"
+    for model in ("pinhole", "radtan", "fisheye", "fov"):
+        cases = [case for name, case in blocks if name == model]
+        topic.group("bundle.normal_equations", "eq-ba-blocks", oracle, rule, cases, flags=(model,))
     return topic
 
 

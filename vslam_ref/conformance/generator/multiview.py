@@ -113,8 +113,8 @@ def build(rng: np.random.Generator) -> Topic:
     oracle = "Horn's quaternion: largest eigenvector of a 4 x 4 matrix, 50 digits"
     for with_scale in (True, False):
         cases = [_alignment_error(rng, with_scale) for _ in range(6)]
-        flags = ("sim3" if with_scale else "se3",)
-        topic.group("multiview.alignment_error", "eq-umeyama", oracle, rule, cases, flags=flags)
+        mode = "sim3" if with_scale else "se3"
+        topic.group("multiview.alignment_error", "eq-umeyama", oracle, rule, cases, flags=(mode,))
     return topic
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
-from vslam_ref.estimation.bundle.normal import Normal
+from vslam_ref.estimation.bundle.normal import Normal, normal_equations
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations, Scene
 from vslam_ref.estimation.bundle.projection import reprojection
 from vslam_ref.estimation.bundle.schur import point_factor, point_steps, reduce
@@ -41,6 +41,17 @@ def _cost(**inputs: Any) -> float:
     robust = Robust()
     errors = whitened(problem.seen.cov_uv, found.r)
     return weigh(robust, robust.sigma(errors, found.valid), errors, found.valid).cost
+
+
+def _normal_equations(**inputs: Any) -> dict[str, Array]:
+    problem = _one_view(**inputs)
+    table = structure(problem)
+    basis = problem.free.intrinsics
+    found = normal_equations(problem.model, table.state(problem), table, np.ones(len(problem.seen)), basis)
+    back = np.argsort(table.point_order)  # points, and with one view observations, in the problem's order
+    W_T = np.swapaxes(found.W[back], 1, 2).reshape(-1, 6)
+    g_point = found.g_point[back].ravel()
+    return {"B": found.B[0], "W_T": W_T, "C": found.C[back], "g_view": found.g_view, "g_point": g_point}
 
 
 def _table(views: int, points: int) -> Structure:
@@ -88,6 +99,7 @@ def _back(W: Array, C: Array, g_point: Array, view_step: Array) -> Array:
 TABLE: Answers = {
     "bundle.residual": _residual,
     "bundle.cost": _cost,
+    "bundle.normal_equations": _normal_equations,
     "bundle.schur": _schur,
     "bundle.back_substitute": _back,
 }
