@@ -1,8 +1,8 @@
 """Asking a foreign program: one line of JSON each way, and nothing it does can hurt.
 
-Request   ``{"id": "…", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}``
-Reply     ``{"id": "…", "value": {"R": [[…], […], […]]}}``, or ``{"id": "…", "unsupported": true}``, or
-          ``{"id": "…", "error": "…"}``.  A function with one output may reply with the bare value.
+* Request: ``{"id": "…", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}``
+* Reply: ``{"id": "…", "value": {"R": [[…], […], […]]}}``, or ``{"id": "…", "unsupported": true}``, or
+  ``{"id": "…", "error": "…"}``.  A function with one output may reply with the bare value.
 
 A program that is silent, dies, prints rubbish or half a line gives a :class:`Reply` that says so.
 """
