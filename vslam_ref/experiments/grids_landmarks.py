@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.choice import MODES, ChoiceConfig, Run, Task, simulate_run
-from vslam_ref.experiments.moving.readings import interval_of_means
+from vslam_ref.experiments.moving.readings import interval_of_means, null_rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,7 +71,7 @@ def _ratio_claim(study: Study, mode: str, id: str, text: str, draw: int) -> Clai
         f"geometric mean of RMSE {mode} / forbidden, same runs: 95 % whole-run interval > 1",
         {"ratio": float(np.exp(log_ratio.mean()))},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(log_ratio > 0)),
         verdict(interval[0] > 1.0),
     )

@@ -17,7 +17,7 @@ from vslam_ref.experiments.moving.localisation import (
     f_score,
     simulate_run,
 )
-from vslam_ref.experiments.moving.readings import interval_of_means, interval_of_ratio
+from vslam_ref.experiments.moving.readings import interval_of_means, interval_of_ratio, null_rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,7 +110,7 @@ def _helps(study: Study) -> Claim:
         "geometric mean over crowds of RMSE separated / plain, per run: 95 % whole-run interval < 1",
         {"ratio": float(np.exp(log_ratio.mean()))},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(log_ratio < 0)),
         verdict(interval[1] < 1.0),
     )
@@ -131,7 +131,7 @@ def _spoils_dynamic(study: Study) -> Claim:
         f"95 % whole-run interval > {FALLS:g}",
         {"true": float(f[:, errors.index(0.0)].mean()), "spoiled": float(f[:, errors.index(SPOILED)].mean())},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(fall > FALLS)),
         verdict(interval[0] > FALLS),
     )
@@ -149,7 +149,7 @@ def _spoils_static(study: Study) -> Claim:
         f"RMSE with a plain grid, densest crowd / empty floor: 95 % whole-run interval > {GROWS:g}",
         {"empty": float(empty.mean()), "dense": float(dense.mean())},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(dense > GROWS * empty)),
         verdict(interval[0] > GROWS),
     )

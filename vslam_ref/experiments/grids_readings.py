@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
-from vslam_ref.experiments.moving.readings import generator, interval_of_means
+from vslam_ref.experiments.moving.readings import generator, interval_of_means, null_rate
 from vslam_ref.experiments.moving.separation import SeparationConfig, measure, precision_recall
 from vslam_ref.grids.inverse_sensor import Where
 from vslam_ref.grids.static_dynamic import Memory
@@ -120,17 +120,6 @@ def claims(result: Result) -> list[Claim]:
 
 def _column(memory: Memory, where: Where) -> int:
     return READINGS.index((memory, where))
-
-
-def null_rate(runs: int) -> float:
-    """How often the 95 % bootstrap interval of a mean of normal values with mean 0 lies above 0.
-
-    The bootstrap's spread is that of the n values, with n in place of n - 1, and n values follow Student's
-    distribution: for 6 runs 6.7 % instead of 2.5 %.
-    """
-    from scipy.stats import t
-
-    return float(t.sf(1.96 * np.sqrt((runs - 1) / runs), runs - 1))
 
 
 def _gain(study: Study, values: Array, better: int, worse: int, draw: int) -> tuple[Array, list[float]]:

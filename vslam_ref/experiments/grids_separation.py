@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
-from vslam_ref.experiments.moving.readings import interval_of_means
+from vslam_ref.experiments.moving.readings import interval_of_means, null_rate
 from vslam_ref.experiments.moving.separation import (
     JUDGED,
     Run,
@@ -103,7 +103,7 @@ def _cleaner(study: Study, S: Array, plain: Array) -> Claim:
         "precision of S minus that of the plain grid, same runs: 95 % whole-run interval > 0",
         {"separated": float(S[:, 0].mean()), "plain": float(plain[:, 0].mean())},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(gain > 0)),
         verdict(interval[0] > 0),
     )
@@ -121,7 +121,7 @@ def _no_loss(study: Study, S: Array, plain: Array) -> Claim:
         "recall of the plain grid minus that of S, same runs: 95 % whole-run interval < 0.01",
         {"separated": float(S[:, 1].mean()), "plain": float(plain[:, 1].mean())},
         interval,
-        0.025,
+        null_rate(study.config.runs),
         float(np.mean(loss < 0.01)),
         verdict(interval[1] < 0.01),
     )

@@ -5,9 +5,9 @@ What is counted, fixed before the runs:
 * *static*: at the end of the run, cells that beams without noise met in at least ``looks`` scans.  The truth
   of a cell is that of the last scan that met it: no map can know what changed unseen.  Recall asks for the
   cells in which such beams *ended* in at least ``looks`` scans.
-* *moving*: at every scan after the first ``warm_up`` seconds, cells that beams meet in this scan.  Recall asks
-  for the cells in which a beam ends now and which a moving thing covers now; precision, of the decided
-  cells, for those that a moving thing covers now.
+* *moving*: at every scan after the first ``warm_up`` seconds, cells that beams meet in this scan.  Recall
+  asks for the cells in which a beam ends now and which a moving thing covers now; precision, of the
+  decided cells, for those that a moving thing covers now.
 """
 
 from __future__ import annotations
