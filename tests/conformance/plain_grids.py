@@ -156,6 +156,24 @@ def static_dynamic(
     return {"s": new_s, "d": new_d}
 
 
+def recursion(table: float, transition: float, prediction: float, wrong: str = "") -> Answer:
+    sign = 1 if wrong == "transition-added" else -1
+    return {"log_odds": table + sign * transition + (0 if wrong == "memory-lost" else prediction)}
+
+
+def explained(s_around: Any, d: float, table: Any, most: Any, reach: int, wrong: str = "") -> Answer:
+    beside = False
+    for i in range(5):
+        for j in range(5):
+            away = abs(i - 2) + abs(j - 2) if wrong == "no-diagonals" else max(abs(i - 2), abs(j - 2))
+            beside |= away <= reach and s_around[i][j] > np.log(9) and wrong != "not-explained"
+    s = s_around[2][2]
+    free = s < -np.log(9) and not beside
+    s, d = s + logit(table["s_low" if free else "s_high"]), d + logit(table["d_high" if free else "d_low"])
+    limits = logit(most["s"]), logit(most["d"])
+    return {"s": float(np.clip(s, -limits[0], limits[0])), "d": float(np.clip(d, -limits[1], limits[1]))}
+
+
 def history(
     times: Any, observations: Any, d_lifetime: float, settle_seconds: float, hit_gap: float, most: Any,
     wrong: str = "", **rules: Any,

@@ -42,6 +42,8 @@ PROGRAM = {
     "reduced.gaussian_predict": lifted.reduced_gaussian_predict,
     "consistency.anchored_trace": ekf.anchored_trace,
     "grid.history": grids.history,
+    "grid.recursion": grids.recursion,
+    "grid.explained": grids.explained,
     "lift.pose": lifted.pose,
     "carleman.predict": lifted.predict,
     "carleman.update": lifted.update,

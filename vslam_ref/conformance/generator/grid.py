@@ -32,6 +32,15 @@ NOTES = {
     ),
     "probabilities-multiplied": ("you multiply probabilities where odds multiply", "logit(p q)"),
     "probabilities-averaged": ("you average the probabilities", "logit((p + q)/2)"),
+    "transition-added": (
+        "you add the log odds of the transition; they stand in the denominator",
+        "table + transition + prediction",
+    ),
+    "not-explained": (
+        "your hits beside a wall are not taken for the wall's: noise makes walls move",
+        "state of the cell itself, whatever is beside it",
+    ),
+    "no-diagonals": ("your neighbours are four; diagonals count, too", "|i| + |j| for max(|i|, |j|)"),
     "memory-lost": ("your cell forgets what it knew", "L = logit(measured)"),
     "recursion-printed": (
         "your recursion is the printed one with a table that holds the prior: the state doubles at each step",
@@ -92,6 +101,7 @@ def build(rng: np.random.Generator) -> Topic:
     _two_maps(topic, rng)
     rays(topic, rng)
     _histories(topic, rng)
+    _explained(topic, rng)
     return topic
 
 
@@ -182,6 +192,13 @@ def _recursion(topic: Topic, rng: np.random.Generator) -> None:
     for flag, draw in draws.items():
         cases = [_one_update(*np.round(draw(), 7).tolist()) for _ in range(15)]
         topic.group("grid.update", "eq-a4-2", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+    cases = []
+    for table, transition, prediction in np.round(rng.normal(0, 2, (10, 3)), 3).tolist():
+        inputs = {"table": table, "transition": transition, "prediction": prediction}
+        values = [mpf(v) for v in (table, transition, prediction)]
+        wrong = {"transition-added": sum(values), "memory-lost": values[0] - values[1]}
+        cases.append(_answers(inputs, "log_odds", values[0] - values[1] + values[2], wrong))
+    topic.group("grid.recursion", "eq-odds-recursion", DEFINITION, rule, cases)
     cases = [_follow(round(rng.uniform(-2, 2), 3), np.round(rng.normal(0.5, 1.2, 8), 3)) for _ in range(12)]
     topic.group("grid.follow", "eq-odds-recursion", DEFINITION, rule, cases)
 
@@ -313,16 +330,30 @@ def history(
     return path
 
 
+def _scripted(k: int) -> tuple[list[float], list[str]]:
+    """Free floor; then a thing that leaves and comes back, or one that nobody looks at for a while."""
+    floor = ["miss"] * 6
+    if k == 0:
+        seen = [*floor, *["hit"] * 4, *["miss"] * 6, *["hit"] * 8]
+        return [0.25 * n for n in range(1, len(seen) + 1)], seen
+    seen = [*floor, *["hit"] * 12]
+    return [0.25 * n + (1.5 if n > 11 else 0.0) for n in range(1, len(seen) + 1)], seen
+
+
+def _drawn(rng: np.random.Generator) -> tuple[list[float], list[str]]:
+    """Mostly misses, then mostly hits, at odd times."""
+    times = np.cumsum(rng.choice([0.25, 0.5, 1.25], 22, p=[0.5, 0.4, 0.1]))
+    chance = np.r_[np.full(6, 0.15), np.full(16, 0.9)]
+    return times.tolist(), ["hit" if hit else "miss" for hit in rng.uniform(size=22) < chance]
+
+
 def _histories(topic: Topic, rng: np.random.Generator) -> None:
     rule = tolerance(1e-14, "a sum of a dozen log odds", absolute=1e-14)
     rules = {"d_lifetime": 1.0, "settle_seconds": 3.0, "hit_gap": 0.8}
     for memory in ("formula", "text"):
         cases = []
-        for k in range(8):
-            gaps = rng.choice([0.25, 0.5, 1.25], 22, p=[0.5, 0.4, 0.1])
-            times = (np.cumsum(gaps)).tolist()
-            chance = np.r_[np.full(6, 0.15), np.full(16, 0.9)]
-            seen = ["hit" if hit else "miss" for hit in rng.uniform(size=22) < chance]
+        for k in range(10):
+            times, seen = _scripted(k) if k < 2 else _drawn(rng)
             where = ("free", "unknown")[k % 2]
             right = history(times, seen, memory, where, rules)
             inputs = {"times": times, "observations": seen, "table": TABLE, "most": MOST, **rules}
@@ -335,3 +366,35 @@ def _histories(topic: Topic, rng: np.random.Generator) -> None:
             one["expected"] = right
             cases.append({**one, "mistakes": mistakes} if mistakes else one)
         topic.group("grid.history", "eq-a4-3", DEFINITION, rule, cases, flags=(f"memory_{memory}",))
+
+
+def _explained(topic: Topic, rng: np.random.Generator) -> None:
+    """A wall somewhere near the middle of a free or unknown neighbourhood."""
+    rule = tolerance(1e-14, "log odds of the table and a sum", absolute=1e-15)
+    for reach in (1, 2):
+        cases = []
+        for k in range(9):
+            around = np.round(rng.uniform(-4, 0, (5, 5)), 3)
+            wall = [(1, 2), (2, 3), (1, 1), (3, 1), (0, 2), (4, 4), (2, 0), (3, 3), (4, 1)][k]
+            around[wall] = 3.5
+            d = round(rng.uniform(-2, 2), 3)
+            away = [abs(i - 2) for i in wall]
+            right = _beside(around[2, 2], d, near=max(away) <= reach)
+            mistakes: dict[str, Any] = {}
+            diagonal = sum(away) > reach  # four neighbours are as good as none there
+            for name, near in [("no-diagonals", False)] if diagonal else [("not-explained", False)]:
+                wrong = _beside(around[2, 2], d, near=near)
+                if wrong not in (right, *mistakes.values()):
+                    mistakes[name] = wrong
+            inputs = {"s_around": around, "d": d, "table": TABLE, "most": MOST, "reach": reach}
+            one: dict[str, Any] = {"inputs": inputs, "expected": right}
+            cases.append({**one, "mistakes": mistakes} if mistakes else one)
+        flags = (f"reach_{reach}",)
+        topic.group("grid.explained", "eq-a4-3", DEFINITION, rule, cases, flags=flags)
+
+
+def _beside(s: float, d: float, *, near: bool) -> dict[str, float]:
+    """After a hit; beside a wall the state is occupied."""
+    of_s, of_d = _entries("occupied" if near else _state(mpf(s)), "hit", "free")
+    values = {"s": (mpf(s), of_s), "d": (mpf(d), of_d)}
+    return {k: float(_bounded(v + logit(TABLE[entry]), MOST[k])) for k, (v, entry) in values.items()}

@@ -66,7 +66,8 @@ def _drive(slam: Slam, controls: Array, sightings: Any, cov_z: Array, **drive: A
     """Feed a filter; yield after every step."""
     for control, seen in zip(controls, sightings, strict=True):
         slam.predict(vehicle.ackermann_increment(control[None], **drive))
-        slam.update(seen["ids"], np.reshape(seen["z"], (1, -1, 2)), cov_z)
+        if seen["ids"]:  # without a call predictions are put together, as they are in use
+            slam.update(seen["ids"], np.reshape(seen["z"], (1, -1, 2)), cov_z)
         yield slam
 
 

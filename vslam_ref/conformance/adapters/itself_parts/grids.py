@@ -25,6 +25,17 @@ def _static_dynamic(s: float, d: float, observation: str, **settings: Any) -> di
     return {"s": float(layers[0, CELL]), "d": float(layers[1, CELL])}
 
 
+def _explained(
+    s_around: Array, d: float, table: dict[str, float], most: dict[str, float], reach: float
+) -> dict[str, float]:
+    layers = _layers()
+    layers[0].reshape(SIDE, SIDE)[1:6, 1:6] = s_around
+    layers[1, CELL], layers[2] = d, 9.9
+    config = _config(table, most, d_memory="formula", d_high_where="free", explained_by=int(reach))
+    _look(layers, 10.0, "hit", config)
+    return {"s": float(layers[0, CELL]), "d": float(layers[1, CELL])}
+
+
 def _history(times: Array, observations: list[str], **settings: Any) -> dict[str, list[float]]:
     layers, config = _layers(), _config(**settings)
     path: dict[str, list[float]] = {"s": [], "d": []}
@@ -46,11 +57,12 @@ def _config(
     table: dict[str, float],
     most: dict[str, float],
     settle_seconds: float | None = None,
+    explained_by: int = 0,
     **settings: Any,
 ) -> static_dynamic.MapConfig:
     return static_dynamic.MapConfig(
         sensor=inverse_sensor.InverseSensor(**table),
-        explained_by=0,
+        explained_by=explained_by,
         settle_seconds=settle_seconds,
         s_most=most["s"],
         d_most=most["d"],
@@ -78,6 +90,10 @@ TABLE: Answers = {
     "grid.follow": lambda start, evidence: recursion.follow(evidence, "printed", "evidence", start),
     "grid.static_dynamic": _static_dynamic,
     "grid.history": _history,
+    "grid.explained": _explained,
+    "grid.recursion": lambda table, transition, prediction: recursion.recursion(
+        table, transition, prediction
+    ),
     "grid.ray_cells": lambda start, end: rays.crossed_cells(start, [end]).cells[:, ::-1],
 }
 
