@@ -11,7 +11,7 @@ import itertools
 from typing import Any
 
 import numpy as np
-from plain_motions import skew
+from plain_motions import se3_exp, skew
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -78,6 +78,17 @@ def meeting(p_a: Array, b_a: Array, p_b: Array, b_b: Array, wrong: str | None = 
     t = np.cross(p_b - p_a, b_a) @ n / (n @ n)
     a, b = p_a + s * b_a, p_b + t * b_b
     return a if wrong == "on-the-first-line" else (a + b) / 2
+
+
+def meeting_slopes(p_a: Array, b_a: Array, p_b: Array, b_b: Array, wrong: str | None = None) -> Any:
+    """Complex steps."""
+
+    def slopes(f: Any, at: Array) -> Array:
+        return np.stack([f(at + 1e-40j * e).imag / 1e-40 for e in np.eye(3)], 1)
+
+    J_b = slopes(lambda v: meeting(p_a, v, p_b, b_b), b_a)
+    J_b = J_b * np.linalg.norm(b_a) if wrong == "length-forgotten" else J_b
+    return {"J_p_a": slopes(lambda v: meeting(v, b_a, p_b, b_b), p_a), "J_b_a": J_b}
 
 
 def epipolar(F: Array, uv_a: Array, uv_b: Array, wrong: str | None = None) -> float:
@@ -162,6 +173,21 @@ def found_pose(*given: bytes) -> Array:
         v = least_squares(miss, np.zeros(6), args=(T,), x_scale=1e-3, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
         T = rigid(Rotation.from_rotvec(v[3:]).as_matrix(), v[:3]) @ T
     return T
+
+
+def pose_optimal(params: Array, X_world: Array, uv: Array, start: Array, wrong: str | None = None) -> Array:
+    """Gauss-Newton with the closed Jacobian."""
+    T = start
+    for _ in range({"start-kept": 0, "one-step": 1}.get(wrong or "", 30)):
+        X = X_world @ T[:3, :3].T + T[:3, 3]
+        x, y, z = X.T
+        zero = 0 * z
+        u = np.stack([params[0] / z, zero, -params[0] * x / z**2], 1)
+        v = np.stack([zero, params[1] / z, -params[1] * y / z**2], 1)
+        J = np.concatenate([np.hstack([d, np.cross(X, d)]) for d in (u, v)])
+        r = params[:2] * X[:, :2] / X[:, 2:] + params[2:4] - uv
+        T = se3_exp(-np.linalg.lstsq(J, r.T.ravel(), rcond=None)[0]) @ T
+    return np.linalg.inv(T) if wrong == "world-from-cam" else T
 
 
 def essential(T_b_a: Array, wrong: str | None = None) -> Array:
@@ -313,6 +339,8 @@ PROGRAM = {
     "multiview.alignment_error": alignment_error,
     "multiview.pose_from_centre": pose_from_centre,
     "multiview.midpoint": meeting,
+    "multiview.midpoint_jacobian": meeting_slopes,
+    "multiview.pose_optimal": pose_optimal,
     "multiview.epipolar_distance": epipolar,
     "multiview.sampson_distance": sampson,
     "multiview.camera_from_world": camera_from_world,

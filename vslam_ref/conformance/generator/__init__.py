@@ -28,6 +28,7 @@ HELPERS = (
     "lens_slopes",
     "pairs",
     "normal",
+    "resecting",
     "similarity",
     "views",
 )

@@ -13,6 +13,7 @@ from vslam_ref.conformance.generator.building import Topic, tolerance
 from vslam_ref.conformance.generator.exact import column, floats, hat, matrix, vector
 from vslam_ref.conformance.generator.groups import motion, turned
 from vslam_ref.conformance.generator.pairs import pair_groups
+from vslam_ref.conformance.generator.resecting import pose_case
 from vslam_ref.conformance.generator.se3 import case
 from vslam_ref.conformance.generator.similarity import Similarity
 from vslam_ref.conformance.generator.views import (
@@ -57,6 +58,9 @@ NOTES = {
     "one-image": ("your gradient is that in one image only", "u_b^T F u_a / |(F u_a)_12|"),
     "fundamental-transposed": ("your matrix relates the images the other way round", "u_a^T F u_b"),
     "on-the-first-line": ("your point lies on the first line, nearest to the second", "p_a + s b_a"),
+    "length-forgotten": ("you differentiate in the unit direction; the given one has a length", "|b| dX/db"),
+    "start-kept": ("your pose is the start", "no step"),
+    "one-step": ("you take one step of Gauss-Newton; the least error is further on", "Exp(xi) T_0, once"),
     "mean-for-root-mean-square": ("you take the mean distance; its root mean square is wanted", "mean |e|"),
     "sum-not-divided": ("you do not divide by the number of points", "(sum |e|^2)^(1/2)"),
     "factors-swapped": ("your essential matrix is R hat(t); hat(t) must stand on the left", "R hat(t)"),
@@ -107,6 +111,11 @@ def build(rng: np.random.Generator) -> Topic:
             flags = (flag, "sim3" if with_scale else "se3")
             topic.group("multiview.umeyama", "eq-umeyama", oracle, rule, cases, flags=flags)
     pair_groups(topic, rng)
+    cases = [pose_case(rng, int(rng.integers(5, 9))) for _ in range(8)]
+    reason = "a minimum found by its gradient: condition of J, below 1e4, times a hundred eps of pixels"
+    best = tolerance(1e-8, reason, float32=1e-2)
+    oracle = "Gauss-Newton to the end, 50 digits"
+    topic.group("multiview.pose_optimal", "eq-resection-refined", oracle, best, cases)
     fine = tolerance(1e-14, "a dozen operations")
     cases = [_pose_from_centre(motion(rng)[:3, :3], rng.uniform(-3, 3, 3)) for _ in range(6)]
     topic.group("multiview.pose_from_centre", "eq-centre", "definition, 50 digits", fine, cases)

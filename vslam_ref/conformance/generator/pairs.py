@@ -9,7 +9,7 @@ import numpy as np
 from mpmath import mpf
 
 from vslam_ref.conformance.generator.building import Topic, tolerance
-from vslam_ref.conformance.generator.exact import floats, hat, matrix, vector
+from vslam_ref.conformance.generator.exact import derivative, floats, hat, matrix, vector
 from vslam_ref.conformance.generator.se3 import case
 from vslam_ref.conformance.generator.views import Array, cameras, in_camera, pixel, scene_point, sensor
 
@@ -28,6 +28,9 @@ def pair_groups(topic: Topic, rng: np.random.Generator) -> None:
     rule = tolerance(1e-12, "an angle above 0.1 between the lines: eps over its square, and ten operations")
     oracle = "least distance of two lines, 50 digits"
     topic.group("multiview.midpoint", "eq-midpoint", oracle, rule, [_midpoint(rng) for _ in range(10)])
+    oracle = "central differences of the definition, 50 digits"
+    cases = [_midpoint_jacobian(rng) for _ in range(6)]
+    topic.group("multiview.midpoint_jacobian", "eq-midpoint-jacobian", oracle, rule, cases)
 
 
 def _pair(rng: np.random.Generator) -> tuple[Array, Array, Array]:
@@ -69,17 +72,41 @@ def _sampson(F: Array, a: Array, b: Array) -> dict[str, Any]:
     return case({"F": F, "uv_a": a, "uv_b": b}, "value", value / mpmath.sqrt(in_a**2 + in_b**2), wrong)
 
 
-def _midpoint(rng: np.random.Generator) -> dict[str, Any]:
-    """Where both feet of the common perpendicular meet half way."""
+def _lines(rng: np.random.Generator) -> tuple[Array, Array, Array, Array]:
+    """Two lines, a point and a direction each, that are far from parallel."""
     while True:
-        p, q, d, e = rng.uniform(-2, 2, (4, 3))
+        p, d, q, e = rng.uniform(-2, 2, (4, 3))
         if np.linalg.norm(np.cross(d, e)) > 0.1 * np.linalg.norm(d) * np.linalg.norm(e):
-            break
-    P, Q, D, E = (mpmath.matrix(vector(v)) for v in (p, q, d, e))
+            return p, d, q, e
+
+
+def _feet(p: list[Any], d: list[Any], q: list[Any], e: list[Any]) -> tuple[Any, Any]:
+    """Ends of the common perpendicular."""
+    P, D, Q, E = (mpmath.matrix(v) for v in (p, d, q, e))
     between = Q - P
     M = mpmath.matrix([[(D.T * D)[0], -(D.T * E)[0]], [(D.T * E)[0], -(E.T * E)[0]]])
     s = mpmath.lu_solve(M, mpmath.matrix([(D.T * between)[0], (E.T * between)[0]]))
-    foot_a, foot_b = P + D * s[0], Q + E * s[1]
-    right = (foot_a + foot_b) * mpf("0.5")
-    wrong = {"on-the-first-line": {"X": list(foot_a)}}
-    return case({"p_a": p, "b_a": d, "p_b": q, "b_b": e}, "X", list(right), wrong)
+    return P + D * s[0], Q + E * s[1]
+
+
+def _middle(p: list[Any], d: list[Any], q: list[Any], e: list[Any]) -> list[Any]:
+    a, b = _feet(p, d, q, e)
+    return list((a + b) * mpf("0.5"))
+
+
+def _midpoint(rng: np.random.Generator) -> dict[str, Any]:
+    lines = _lines(rng)
+    exact = [vector(v) for v in lines]
+    wrong = {"on-the-first-line": {"X": list(_feet(*exact)[0])}}
+    return case(dict(zip(("p_a", "b_a", "p_b", "b_b"), lines, strict=True)), "X", _middle(*exact), wrong)
+
+
+def _midpoint_jacobian(rng: np.random.Generator) -> dict[str, Any]:
+    lines = _lines(rng)
+    p, d, q, e = (vector(v) for v in lines)
+    length = mpmath.norm(mpmath.matrix(d))
+    J_p, J_d = derivative(lambda v: _middle(v, d, q, e), p), derivative(lambda v: _middle(p, v, q, e), d)
+    right = {"J_p_a": floats(J_p), "J_b_a": floats(J_d)}
+    wrong = {"length-forgotten": {"J_p_a": right["J_p_a"], "J_b_a": floats(J_d * length)}}
+    inputs = dict(zip(("p_a", "b_a", "p_b", "b_b"), lines, strict=True))
+    return {"inputs": inputs, "expected": right, "mistakes": wrong}

@@ -122,10 +122,10 @@ def _jacobian(phi: Array, flag: str) -> dict[str, Any]:
     x = vector(phi)
     J = left_jacobian(x)
     mistakes = {"right-jacobian": {"J": floats(J.T)}}
-    if flag == "small_angle" and np.linalg.norm(phi) > 1e-6:
-        mistakes = {"small-angle-sign": {"J": floats(mpmath.eye(3) - hat(x) / 2)}}
-    elif np.linalg.norm(phi) <= 1e-6:
-        mistakes = {}
+    if flag == "small_angle":
+        # told apart from the right answer down to a thousand tolerances
+        wrong = {"small-angle-sign": {"J": floats(mpmath.eye(3) - hat(x) / 2)}}
+        mistakes = wrong if np.linalg.norm(phi) > 1e-11 else {}
     return {"inputs": {"phi": phi}, "expected": {"J": floats(J)}, "mistakes": mistakes}
 
 

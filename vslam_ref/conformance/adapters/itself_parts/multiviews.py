@@ -7,11 +7,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
-from vslam_ref.estimation.resection import resect
+from vslam_ref.estimation.resection import refine_pose, resect
 from vslam_ref.geometry.alignment import align
 from vslam_ref.geometry.camera_pose import camera_from_world, pose_from_centre
 from vslam_ref.geometry.cameras import Pinhole
-from vslam_ref.geometry.multiview.closest_point import midpoint
+from vslam_ref.geometry.multiview.closest_point import midpoint, midpoint_with_jacobians
 from vslam_ref.geometry.multiview.epipolar import (
     epipolar_distance,
     essential_from_motion,
@@ -53,6 +53,18 @@ def _pnp(params: Array, X_world: Array, uv: Array) -> Array:
     return found.T_cam_world
 
 
+def _pose_optimal(params: Array, X_world: Array, uv: Array, start: Array) -> Array:
+    found = refine_pose(Pinhole.from_params(params), X_world, uv, start)
+    if not found.converged:
+        raise ValueError(found.reason)
+    return found.T_cam_world
+
+
+def _midpoint_jacobian(p_a: Array, b_a: Array, p_b: Array, b_b: Array) -> dict[str, Array]:
+    found = midpoint_with_jacobians(p_a, b_a, p_b, b_b)
+    return {"J_p_a": found.J_p_a, "J_b_a": found.J_b_a}
+
+
 def _p3p(bearings: Array, X_world: Array) -> Array:
     found = p3p(bearings[None], X_world[None])
     if found.reason[0]:
@@ -70,6 +82,8 @@ TABLE: Answers = {
     "multiview.triangulate": _triangulate,
     "multiview.triangulate_optimal": _optimal,
     "multiview.pnp": _pnp,
+    "multiview.pose_optimal": _pose_optimal,
+    "multiview.midpoint_jacobian": _midpoint_jacobian,
     "multiview.p3p": _p3p,
     "multiview.essential": lambda T_b_a: essential_from_motion(T_b_a),
     "multiview.umeyama": _umeyama,
