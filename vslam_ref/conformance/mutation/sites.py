@@ -2,7 +2,8 @@
 
 Only what computes is changed: not documentation, annotations, default values, messages, nor the checks that
 lead to them.  Nothing inside a comparison is changed either: where a series takes over near its
-threshold, or how small a singular value counts as zero, makes no difference that anybody could see.
+threshold, or how small a singular value counts as zero, makes no difference that anybody could see.  Nor are
+the axes of arrays, nor the order of a matrix and itself.
 """
 
 from __future__ import annotations
@@ -107,7 +108,15 @@ def _walk(node: ast.AST) -> Iterator[ast.AST]:
         return
     yield node
     for child in ast.iter_child_nodes(node):
-        yield from _walk(child)
+        if not (isinstance(node, ast.Call | ast.keyword) and _is_axis(child)):
+            yield from _walk(child)
+
+
+def _is_axis(node: ast.AST) -> bool:
+    """A negative whole number as an argument: which axis, from the end."""
+    negative = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
+    operand = getattr(node, "operand", None)
+    return negative and isinstance(operand, ast.Constant) and isinstance(operand.value, int)
 
 
 Change = tuple[str, "Carry"]
@@ -149,7 +158,7 @@ def _operator(node: ast.BinOp) -> Iterator[Change]:
         yield "* to /", Carry(node, op=ast.Div())
     elif isinstance(node.op, ast.Div):
         yield "/ to *", Carry(node, op=ast.Mult())
-    elif isinstance(node.op, ast.MatMult):
+    elif isinstance(node.op, ast.MatMult) and ast.dump(node.left) != ast.dump(node.right):
         yield "factors exchanged", Carry(node, left=node.right, right=node.left)
     elif isinstance(node.op, ast.Pow):
         yield "a power left out", Carry(node, op=ast.Mult(), right=ast.Constant(1))

@@ -111,9 +111,9 @@ def lift_vehicle_jacobian(pose: ArrayLike) -> Array:
 def lift_landmark(pose: ArrayLike, landmark: ArrayLike) -> Array:
     """Lift landmarks (..., 2), seen from poses (..., 3), to (..., 6). Implements :eq:`eq-b15` (B15)."""
     pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
-    x, y = landmark[..., 0], landmark[..., 1]
-    s, c = np.sin(pose[..., 2]) + 0 * x, np.cos(pose[..., 2]) + 0 * x
-    return np.stack([x + 0 * s, y + 0 * s, s * x, c * x, s * y, c * y], -1)
+    x, y, theta = np.broadcast_arrays(landmark[..., 0], landmark[..., 1], pose[..., 2])
+    s, c = np.sin(theta), np.cos(theta)
+    return np.stack([x, y, s * x, c * x, s * y, c * y], -1)
 
 
 def vehicle_matrix(w: ArrayLike) -> Array:
