@@ -93,7 +93,7 @@ def _mutants(options: argparse.Namespace) -> int:
     """Run a sample of mutants.  Nothing numeric may be imported here before the mutants are forked."""
     import os
 
-    from vslam_ref.conformance.mutation.study import GOAL, study
+    from vslam_ref.conformance.mutation.study import GOAL, study, why_equivalent
 
     if not hasattr(os, "fork"):
         raise ValueError("mutants need os.fork, which this system does not have")
@@ -102,13 +102,16 @@ def _mutants(options: argparse.Namespace) -> int:
     def told(mutant: Mutant, verdict: Verdict) -> None:
         if not verdict.killed:
             place = f"{mutant.module}.{mutant.function}, line {mutant.line}"
-            print(f"survives: {place}: {mutant.text}", flush=True)
+            why = why_equivalent(mutant)
+            print(f"survives: {place}: {mutant.text}{f' ({why})' if why else ''}", flush=True)
 
     found = study(options.sample, options.seed, options.jobs, told)
-    share = found.killed / max(1, len(found.sample))
+    share = found.share
     run_by, unseen = len(found.functions), len(found.unseen)
     print(f"functions that cite an equation: {run_by} are run by the vectors, {unseen} are not")
-    noticed = f"{found.killed} of {len(found.sample)} mutants noticed ({100 * share:.1f} %)"
+    noticeable = len(found.sample) - found.equivalent
+    noticed = f"{found.killed} of {noticeable} mutants noticed ({100 * share:.1f} %)"
+    print(f"{found.equivalent} of the sample cannot be noticed, as mutation/equivalent.py explains")
     print(f"{noticed}, of {found.possible} possible; {found.unreached} stand in lines that no vector runs")
     if target is not None:
         import json

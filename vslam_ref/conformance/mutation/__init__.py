@@ -4,11 +4,12 @@ A *mutant* is the library with one operator, sign, order or constant changed ins
 equation.  The vectors are asked as a user's program would be; a mutant that passes them all *survives*, and
 shows what the vectors do not see.
 
-=============  ===================================================================================
-module         holds
-=============  ===================================================================================
-``sites``      where a function can be changed, and how
-``child``      the library with one change, in a process of its own
-``study``      a seeded sample of mutants, run side by side
-=============  ===================================================================================
+==============  ==================================================================================
+module          holds
+==============  ==================================================================================
+``sites``       where a function can be changed, and how
+``child``       the library with one change, in a process of its own
+``study``       a seeded sample of mutants, run side by side
+``equivalent``  changes that change nothing, and why
+==============  ==================================================================================
 """

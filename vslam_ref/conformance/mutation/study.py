@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 from vslam_ref.conformance.mutation.child import ROOT, Verdict, executed, run_mutant, source_of
+from vslam_ref.conformance.mutation.equivalent import EQUIVALENT
 from vslam_ref.conformance.mutation.sites import Mutant, mutants
 
 ROOMS = ("geometry", "estimation", "filters", "grids")
@@ -54,13 +55,23 @@ class Study(NamedTuple):
     seconds: float
 
     @property
+    def equivalent(self) -> int:
+        """Number of survivors that no program could tell from the library."""
+        return sum(bool(why_equivalent(mutant)) for mutant, verdict in self.sample if not verdict.killed)
+
+    @property
+    def share(self) -> float:
+        """Share of mutants noticed, of those that can be."""
+        return self.killed / max(1, len(self.sample) - self.equivalent)
+
+    @property
     def killed(self) -> int:
         """Number of mutants that the vectors noticed."""
         return sum(verdict.killed for _, verdict in self.sample)
 
     def numbers(self) -> dict[str, Any]:
         """Content of ``--json``."""
-        survivors = [m._asdict() for m, v in self.sample if not v.killed]
+        survivors = [m._asdict() | {"equivalent": why_equivalent(m)} for m, v in self.sample if not v.killed]
         return {
             "functions": self.functions,
             "unseen": self.unseen,
@@ -69,10 +80,18 @@ class Study(NamedTuple):
             "not_asked": NOT_ASKED,
             "sample": len(self.sample),
             "killed": self.killed,
-            "share": self.killed / max(1, len(self.sample)),
+            "equivalent": self.equivalent,
+            "share": self.share,
             "survivors": survivors,
             "seconds": self.seconds,
         }
+
+
+def why_equivalent(mutant: Mutant) -> str:
+    """Why a mutant cannot be noticed, or nothing."""
+    line = source_of(mutant.module)[0].splitlines()[mutant.line - 1].strip()
+    name = f"{mutant.module.removeprefix('vslam_ref.')}.{mutant.function}"
+    return EQUIVALENT.get((name, line, mutant.text), "")
 
 
 def modules() -> list[str]:

@@ -1,0 +1,52 @@
+"""Changes that change nothing: mutants that no program could tell from the library, and why.
+
+A mutant is known by its function, the text of its line, and what was done there; when the line is rewritten,
+it is no longer known, and must be thought about again.
+"""
+
+from __future__ import annotations
+
+COMMUTE = "polynomials of one matrix commute"
+SIGNS = "every entry is +1 or -1, its own reciprocal"
+
+EQUIVALENT: dict[tuple[str, str, str], str] = {
+    (
+        "geometry.alignment.align",
+        "rmse = float(np.sqrt(w @ np.sum(left**2, axis=1)))",
+        "factors exchanged",
+    ): "the scalar product of two vectors",
+    (
+        "geometry.alignment.align",
+        "scale = float(D @ S) / moves_x if with_scale and scale_known else 1.0",
+        "factors exchanged",
+    ): "the scalar product of two vectors",
+    ("geometry.alignment.align", "R = (U * S) @ Vt", "* to /"): SIGNS,
+    (
+        "geometry.cameras.projection.pose_jacobian",
+        "return np.concatenate([J, np.cross(np.broadcast_to(X[..., None, :], J.shape), J) + 0.0], -1)",
+        "+ to -",
+    ): "0.0 is added for the sign of a zero only",
+    (
+        "geometry.multiview.three_points.conics",
+        "a = (a / a.sum(axis=1, keepdims=True))[..., None, None]",
+        "/ to *",
+    ): "the equations are homogeneous: their common factor cancels",
+    ("geometry.sim3.left_jacobian", "J = one + A @ J / n", "factors exchanged"): COMMUTE,
+    ("geometry.sim3.left_jacobian", "J = (J + adjoint(exp(part)) @ J) / 2", "factors exchanged"): COMMUTE,
+    (
+        "filters.carleman_ekf.lifted.LiftedCarlemanEkf.predict",
+        "self._steps += 1",
+        "the sign of an addition in place",
+    ): "how many steps are gathered before they are used",
+    (
+        "filters.carleman_ekf.lifted.LiftedCarlemanEkf._augment",
+        "more = max(lift.LANDMARK, self._z.shape[1] - lift.VEHICLE)",
+        "- to +",
+    ): "how much room is made for later landmarks",
+    (
+        "filters.carleman_ekf.lift.placement_matrices",
+        "sign = -1.0 if variant.b26_as_printed else 1.0",
+        "a minus sign left out",
+    ): "the row as it is printed, a variant that no vector asks for",
+}
+"""(module.function below the package, line, change) -> why it cannot be noticed."""
