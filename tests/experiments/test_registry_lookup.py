@@ -84,7 +84,7 @@ def test_every_setting_of_every_experiment_can_be_set_and_written(id):
 def test_runs_and_seed_reach_every_experiment_that_draws(id):
     experiment = load(id)
     default = experiment.default()
-    for name, changed in (("runs", {"runs": 4}), ("seed", {"seed": 12345})):
+    for name, changed in (("runs", {"runs": 21}), ("seed", {"seed": 12345})):
         key = find_setting(default, name)
         if key is not None:
             config = experiment.configure(**changed)
