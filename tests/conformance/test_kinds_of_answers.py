@@ -141,6 +141,4 @@ def test_every_kind_goes_out_and_comes_home() -> None:
     sent = away.inputs(function, given)
     assert np.abs(np.array(sent["H"]) - given["H"]).max() > 0.1
     home = away.outputs(function, {"H": sent["H"]}, given)["H"]
-    assert (
-        np.abs(np.array(home) - given["H"]).max() < 1e-12
-    )  # a product there and back, of order 10
+    assert np.abs(np.array(home) - given["H"]).max() < 1e-12  # a product there and back, of order 10
