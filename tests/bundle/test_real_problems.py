@@ -117,3 +117,16 @@ def test_libmv_robust_loss_changes_the_answer_little() -> None:
     result = bundle_adjust(perturbed(stored, seed=1, turn=1e-4, move=0.01), Robust(Huber(3.0)))
     assert result.converged
     assert 4000 < result.cost < 4607.592
+
+
+@needs_libmv
+def test_libmv_broken_points_miss(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same start, the sign of the points' steps flipped: as many steps as the right one needs end above."""
+    from vslam_ref.estimation.bundle import schur
+
+    assert LIBMV is not None
+    stored = read_libmv(LIBMV / "problem_01.bin").problem
+    honest = schur.point_steps
+    monkeypatch.setattr(schur, "point_steps", lambda *a: -honest(*a))
+    start = perturbed(stored, seed=1, turn=1e-4, move=0.01)
+    assert bundle_adjust(start, options=Options(max_iterations=12)).cost > 1.1 * 4607.592
