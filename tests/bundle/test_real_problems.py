@@ -121,7 +121,7 @@ def test_libmv_robust_loss_changes_the_answer_little() -> None:
 
 @needs_libmv
 def test_libmv_broken_points_miss(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same start, the sign of the points' steps flipped: as many steps as the right one needs end above."""
+    """The points' steps with the other sign: as many steps as the right ones need end above."""
     from vslam_ref.estimation.bundle import schur
 
     assert LIBMV is not None
