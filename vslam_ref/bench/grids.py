@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from vslam_ref import _kernels
+from vslam_ref.bench.rows import row
 from vslam_ref.bench.timing import paired
 from vslam_ref.datasets import carmen, catalogue
 from vslam_ref.grids import MapConfig, StaticDynamicMap, inverse_sensor, static_dynamic
@@ -50,20 +51,6 @@ def run(quick: bool = False) -> dict[str, Any]:
             with _kernels.use_backend(backend):
                 rows += one_scan(backend, quick) + real_logs(backend, quick)
     return {"rows": rows, "threads": 1, "peer": "Bresenham loops in plain Python"}
-
-
-def _row(goal: str, case: str, backend: str, value: float, unit: str, least: float | None) -> dict[str, Any]:
-    met = None if least is None else "yes" if value >= least else "no"
-    bound = None if least is None else f">= {least:g}"
-    return {
-        "goal": goal,
-        "case": case,
-        "backend": backend,
-        "value": value,
-        "unit": unit,
-        "bound": bound,
-        "met": met,
-    }
 
 
 def room() -> tuple[Array, Array]:
@@ -141,13 +128,19 @@ def one_scan(backend: str, quick: bool) -> list[dict[str, Any]]:
     took = result.seconds
     least = GOALS_OG_1[backend]
     return [
-        _row("OG-1", "plain grid, one scan", backend, 1e3 * took["plain grid"], "ms", None),
-        _row("OG-1", "S and D, one scan", backend, 1e3 * took["S and D"], "ms", None),
-        _row("OG-1", "Bresenham loops, one scan", backend, 1e3 * took["Bresenham loops"], "ms", None),
-        _row("OG-1", "Bresenham loops / plain grid", backend, result.ratio["Bresenham loops"], "x", least),
-        _row(
-            "OG-1", "Bresenham loops / S and D", backend, took["Bresenham loops"] / took["S and D"], "x", None
+        row("OG-1", "plain grid, one scan", backend, 1e3 * took["plain grid"], "ms"),
+        row("OG-1", "S and D, one scan", backend, 1e3 * took["S and D"], "ms"),
+        row("OG-1", "Bresenham loops, one scan", backend, 1e3 * took["Bresenham loops"], "ms"),
+        row(
+            "OG-1",
+            "Bresenham loops / plain grid",
+            backend,
+            result.ratio["Bresenham loops"],
+            "x",
+            least,
+            below=False,
         ),
+        row("OG-1", "Bresenham loops / S and D", backend, took["Bresenham loops"] / took["S and D"], "x"),
     ]
 
 
@@ -167,5 +160,7 @@ def real_logs(backend: str, quick: bool) -> list[dict[str, Any]]:
                 grid.update(pose, scan)
             rates.append(len(scans) / (time.perf_counter() - began))
         case = f"{name}, {len(scans)} scans of {log.scanner.beams} beams"
-        rows.append(_row("RL", case, backend, float(np.median(rates)), "scans/s", GOALS_RL[backend]))
+        rows.append(
+            row("RL", case, backend, float(np.median(rates)), "scans/s", GOALS_RL[backend], below=False)
+        )
     return rows

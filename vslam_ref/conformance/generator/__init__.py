@@ -30,6 +30,7 @@ HELPERS = (
     "normal",
     "resecting",
     "similarity",
+    "two_maps",
     "views",
 )
 
