@@ -138,6 +138,7 @@ def _drawn(rng: np.random.Generator) -> tuple[list[float], list[str]]:
 
 
 def histories(topic: Topic, rng: np.random.Generator) -> None:
+    """What a cell saw over time, and what S and D make of it."""
     rule = tolerance(1e-14, "a sum of a dozen log odds", absolute=1e-14)
     rules = {"d_lifetime": 1.0, "settle_seconds": 3.0, "hit_gap": 0.8}
     for memory in ("formula", "text"):
