@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--chapter", metavar="C", type=int, action="append", help="only this chapter; may repeat"
     )
     parser.add_argument("--topic", metavar="T", action="append", help="only this topic, as so3; may repeat")
+    parser.add_argument("--case", metavar="ID", action="append", help="only this case; may repeat")
     parser.add_argument("--convention", metavar="FILE", help="the program's conventions, JSON")
     parser.add_argument("--float32", action="store_true", help="tolerances of single precision")
     parser.add_argument("--timeout", metavar="S", type=float, default=10.0, help="seconds a reply may take")
@@ -102,6 +103,12 @@ def _files(options: argparse.Namespace) -> list[VectorFile]:
         if (not options.chapter or file.chapter in options.chapter)
         and (not options.topic or Path(file.name).stem in options.topic)
     ]
+    if options.case:
+        chosen = [file._replace(cases=[c for c in file.cases if c.id in options.case]) for file in kept]
+        kept = [file for file in chosen if file.cases]
+        missing = set(options.case) - {c.id for file in kept for c in file.cases}
+        if missing:
+            raise ValueError(f"no case {sorted(missing)[0]!r} in the chosen chapters and topics")
     if not kept:
         chapters = ", ".join(map(str, sorted({file.chapter for file in found})))
         topics = ", ".join(Path(file.name).stem for file in found)
