@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vslam_ref.commands.options import add_json, at_least, json_target
+from vslam_ref.commands.options import add_json, at_least, json_target, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.conformance.mutation.child import Verdict
@@ -113,8 +113,5 @@ def _mutants(options: argparse.Namespace) -> int:
     noticed = f"{found.killed} of {noticeable} mutants noticed ({100 * share:.1f} %)"
     print(f"{found.equivalent} of the sample cannot be noticed, as mutation/equivalent.py explains")
     print(f"{noticed}, of {found.possible} possible; {found.unreached} stand in lines that no vector runs")
-    if target is not None:
-        import json
-
-        target.write_text(json.dumps(found.numbers(), indent=2) + "\n", encoding="utf-8")
+    write_json(target, found.numbers())
     return 0 if share >= GOAL else 1

@@ -13,11 +13,11 @@ OpenCV's pixel (0, 0) is the centre of the top-left pixel, as ours.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.datasets.atomic import write_bytes
 from vslam_ref.datasets.calibration_files.record import CameraFile
 from vslam_ref.datasets.calibration_files.yaml_nodes import Array, Node, build, read_yaml
 from vslam_ref.geometry.cameras import MODELS, Camera
@@ -152,10 +152,7 @@ def write_opencv(path: Path | str, file: CameraFile) -> None:
     lines += _matrix_lines("camera_matrix", camera.matrix)
     if len(camera.params) > 4:
         lines += _matrix_lines("distortion_coefficients", camera.params[4:, None])
-    target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}")
-    beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    beside.replace(target)
+    write_bytes(Path(path), ("\n".join(lines) + "\n").encode())
 
 
 def _matrix_lines(name: str, values: Array) -> list[str]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import gzip
-import os
-import uuid
 from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.datasets.atomic import write_bytes
 from vslam_ref.datasets.text import Array, IntArray
 from vslam_ref.datasets.trajectories.formats import EUROC, FORMATS, TUM, AsRead, matrices, seconds
 from vslam_ref.geometry import quaternion
@@ -38,13 +36,7 @@ def write(path: Path, trajectory: Trajectory, format: str, as_read: AsRead | Non
     Without ``as_read``, quaternions are computed from the matrices (right to a few eps), and EuRoC's times
     are rounded to whole nanoseconds.
     """
-    data = to_text(trajectory, format, as_read).encode()
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}")
-    try:
-        temporary.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_bytes(path, to_text(trajectory, format, as_read).encode())
 
 
 def to_text(trajectory: Trajectory, format: str, as_read: AsRead | None = None) -> str:

@@ -15,9 +15,16 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.estimation.bundle.problem import Array, IntArray
-from vslam_ref.estimation.bundle.projection import Linearised, Links, State, linearise, polynomial_params
+from vslam_ref.estimation.bundle.projection import (
+    Linearised,
+    Links,
+    State,
+    is_polynomial,
+    linearise,
+    polynomial_params,
+)
 from vslam_ref.estimation.bundle.structure import Structure
-from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
+from vslam_ref.geometry.cameras import Camera, Radtan
 
 
 class Normal(NamedTuple):
@@ -50,7 +57,7 @@ def normal_equations(
     links, root = table.links, np.sqrt(weights)
     U = table.whitener * root[:, None, None]
     orders = (table.offsets, table.view_order, table.view_offsets)
-    if model in (Pinhole, Radtan):
+    if is_polynomial(model):
         padded = np.zeros((9, basis.shape[1]))
         padded[: len(basis)] = basis
         params = polynomial_params(state.intrinsics)
@@ -116,7 +123,7 @@ def _blocks(
     for column, (a, b) in enumerate(upper):
         products[:, column] = J_point[:, 0, a] * J_point[:, 0, b] + J_point[:, 1, a] * J_point[:, 1, b]
     products[:, 6:] = J_point[:, 0] * r[:, :1] + J_point[:, 1] * r[:, 1:]
-    sums = _sum_by_point(products, offsets)
+    sums = sum_by_point(products, offsets)
     C = np.empty((len(sums), 3, 3))
     for column, (a, b) in enumerate(upper):
         C[:, a, b] = C[:, b, a] = sums[:, column]
@@ -134,7 +141,7 @@ def _weighted(at: Linearised, U: Array) -> tuple[Array, Array, Array]:
     return np.einsum("nab,nb->na", U, at.r), U @ at.J_view, U @ at.J_point
 
 
-def _sum_by_point(rows: Array, offsets: IntArray) -> Array:
+def sum_by_point(rows: Array, offsets: IntArray) -> Array:
     """Sum rows (n, m) of each point, (N, m): a product with a matrix of zeros and ones."""
     from scipy.sparse import csr_array
 

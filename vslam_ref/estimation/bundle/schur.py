@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.estimation.bundle.normal import Normal
+from vslam_ref.estimation.bundle.normal import Normal, sum_by_point
 from vslam_ref.estimation.bundle.problem import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle.structure import Structure
 
@@ -205,10 +205,7 @@ def point_steps(
 
     Implements :eq:`eq-back-substitution`.
     """
-    from scipy.sparse import csr_array
-
     pulled = np.matmul(view_steps[view][:, None, :], W)[:, 0]
-    n, points = len(W), len(offsets) - 1
-    total = csr_array((np.ones(n), np.arange(n), offsets), shape=(points, n)) @ pulled + g_point
+    total = sum_by_point(pulled, offsets) + g_point
     steps: Array = -np.matmul(M, np.matmul(total[:, None, :], M)[:, 0][..., None])[..., 0]
     return steps

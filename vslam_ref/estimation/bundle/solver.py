@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vslam_ref.estimation.bundle import projection, reduced_system, schur
-from vslam_ref.estimation.bundle.problem import BoolArray, BundleProblem, Scene
+from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, Scene
 from vslam_ref.estimation.bundle.projection import State
 from vslam_ref.estimation.bundle.result import BundleResult, Iteration, Reason
 from vslam_ref.estimation.bundle.step import DAMPED, Point, Step, System, damped_step, moved, system_at
@@ -91,7 +91,11 @@ class _Run:
     def point(self, state: State, sigma: float | None = None) -> Point:
         """Evaluate a state, at a given scale or at its own."""
         r, valid = projection.residuals(self.problem.model, state, self.table.links)
-        errors = np.einsum("nab,nb->na", self.table.whitener, r) if self.table.has_cov else r
+        return self.weighed(state, r, valid, sigma)
+
+    def weighed(self, state: State, r: Array, valid: BoolArray, sigma: float | None = None) -> Point:
+        """Weigh the residuals of a state, at a given scale or at their own."""
+        errors = self.table.whitened(r)
         counted = valid & self.active
         used = self.robust.sigma(errors, counted) if sigma is None else sigma
         costs, weights, used = weigh(self.robust, used, errors, valid)
@@ -207,7 +211,8 @@ def _descend(run: _Run, here: Point, progress: Progress | None) -> tuple[Point, 
         if judged.accepted and trial is not None:
             run.damping, run.growth = max(run.damping * gain_factor(judged.gain), 1e-16), 2.0
             before = here
-            here = run.point(trial.state) if run.robust.scale == "adaptive" else trial
+            # at its own scale, if that is adaptive: the residuals are known
+            here = run.weighed(*trial[:3]) if run.robust.scale == "adaptive" else trial
             system = None
             settled = abs(here.weighted.sigma / before.weighted.sigma - 1.0) <= options.scale
             if settled and judged.decrease <= options.cost * before.weighted.cost:

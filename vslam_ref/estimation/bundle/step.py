@@ -55,7 +55,7 @@ def system_at(problem: BundleProblem, table: Structure, at: Point) -> System:
     diagonal = schur.diagonals(normal, table)
     g_view = schur.add_at_columns(table.columns, normal.g_view, table.size)
     g_point = normal.g_point * table.free_point[:, None]
-    errors = np.einsum("nab,nb->na", table.whitener, at.r) if table.has_cov else at.r
+    errors = table.whitened(at.r)
     length = math.sqrt(float(np.einsum("n,ni,ni->", at.weighted.weights, errors, errors)))
     norm = 0.0
     if length > 0.0:

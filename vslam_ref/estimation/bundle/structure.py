@@ -102,6 +102,10 @@ class Structure:
     free_point: BoolArray
     windows: Windows
 
+    def whitened(self, r: Array) -> Array:
+        """Residuals (n, 2) of the sorted observations, in standard deviations."""
+        return np.einsum("nab,nb->na", self.whitener, r) if self.has_cov else r
+
     def state(self, problem: BundleProblem) -> State:
         """Start of the problem, its points sorted."""
         T = problem.scene.T_cam_world
