@@ -33,6 +33,7 @@ class Slow:
 
     def __init__(self, config: MapConfig) -> None:
         self.c, self.cells, self.plain = config, {}, {}
+        self.grazed = 0
 
     def state(self, cell: tuple[int, int]) -> int:
         odds = math.exp(self.cells[cell]["s"]) if cell in self.cells else 1.0
@@ -50,15 +51,21 @@ class Slow:
             length = min(r, c.usable_range, scan.max_range)
             direction = np.array([np.cos(pose[2] + angle), np.sin(pose[2] + angle)])
             end = (pose[:2] + length * direction) / c.resolution
-            for cell in rays.crossed_cells(start, [end]).cells.tolist():
-                observed[tuple(cell)] = "miss"
-            if r < scan.max_range and r <= c.usable_range:
+            is_hit = r < scan.max_range and r <= c.usable_range
+            crossed = [tuple(cell) for cell in rays.crossed_cells(start, [end]).cells.tolist()]
+            longer = 1 if abs(end[0] - start[0]) >= abs(end[1] - start[1]) else 0
+            for cell in crossed:
+                near = is_hit and c.graze > 0 and abs(cell[longer] - crossed[-1][longer]) <= c.graze
+                if not near or cell not in observed:
+                    observed[cell] = "graze" if near else "miss"
+            if is_hit:
                 x, y = rays.end_cells(end[None])[0].tolist()
                 hits.append((y, x))
         observed |= dict.fromkeys(hits, "hit")
         before = {cell: self.state(cell) for cell in self.cells}
         for cell, what in observed.items():
             self.one(cell, what, before, scan.time)
+            self.grazed += what == "graze"
             e = s.s_high if what == "hit" else s.s_miss
             most = math.log(c.s_most / (1 - c.s_most))
             value = self.plain.get(cell, 0.0) + math.log(e / (1 - e))
@@ -77,7 +84,11 @@ class Slow:
             m["last_hit"] = now
             r = c.explained_by
             near = [(cell[0] + i, cell[1] + j) for i in range(-r, r + 1) for j in range(-r, r + 1)]
-            settled = c.settle_seconds is not None and now - m["since"] >= c.settle_seconds
+            wait = math.inf if c.settle_seconds is None else c.settle_seconds
+            beside = [(cell[0] + i, cell[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+            if c.settle_beside is not None and any(before.get(n) == OCCUPIED for n in beside):
+                wait = min(wait, c.settle_beside)
+            settled = now - m["since"] >= wait
             if state == FREE and settled:
                 m["s"], state = 0.0, UNKNOWN
             if r > 0 and any(before.get(n) == OCCUPIED for n in near):
@@ -89,6 +100,8 @@ class Slow:
             if now - m["last_hit"] > c.hit_gap:
                 m["last_hit"] = -math.inf
             p_s, p_d = s.s_miss, s.d_miss
+            if what == "graze" and state != FREE:
+                p_s = 0.5 if state == OCCUPIED else s.s_graze
         if c.d_memory == "text" or now - m["seen"] > c.d_lifetime:
             m["d"] = 0.0
         m["seen"] = now
@@ -118,6 +131,8 @@ CONFIGS = {
     "text": MapConfig(d_memory="text", explained_by=0),
     "unknown": MapConfig(d_high_where="unknown", settle_seconds=None),
     "text-unknown": MapConfig(d_memory="text", d_high_where="unknown", usable_range=1.9, no_return="free"),
+    "grazing": MapConfig(d_memory="text", explained_by=0, graze=3, settle_beside=0.5, settle_seconds=2.0),
+    "grazing-wide": MapConfig(graze=8, settle_beside=0.0, explained_by=2, settle_seconds=None),
     "wide": MapConfig(explained_by=2, settle_seconds=1.0, d_lifetime=0.5, resolution=0.07),
 }
 
@@ -131,6 +146,7 @@ def test_maps_are_those_of_the_slow_account(name: str, backend: str) -> None:
         slow.update(pose, scan)
         fast.update(pose, scan)
         plain.update(pose, scan)
+    assert (slow.grazed > 0) == (config.graze > 0)
     cells = np.array(sorted(slow.cells)) - fast.lattice.corner[::-1]
     at = cells[:, 0], cells[:, 1]
     assert np.count_nonzero(fast.observed()) == len(cells)
@@ -367,6 +383,8 @@ def test_a_refused_scan_leaves_the_map_as_it_was(pose: list, scan: Scan, what: s
         {"d_high_where": "occupied"},
         {"explained_by": -1},
         {"settle_seconds": 0.0},
+        {"settle_beside": -1.0},
+        {"graze": -1},
         {"d_lifetime": 0.0},
         {"hit_gap": 0.0},
         {"s_most": 0.5},
@@ -399,3 +417,54 @@ def test_the_map_grows_beyond_its_borders_and_nothing_moves(backend: str) -> Non
     xy = ready.lattice.world_from_cells(np.stack([rows, columns], 1))
     np.testing.assert_array_equal(grown.static().at(xy), ready.static().log_odds[rows, columns])
     assert grown.observed().sum() == len(rows)
+
+
+def test_a_wall_met_at_a_small_angle_keeps_its_cells_where_grazing_counts_less(backend: str) -> None:
+    """Beams at 5 to 40 degrees along a wall that is known: a plain table frees cells of it, and for good.
+
+    Seen head on before, the wall is static.  Then beams run along it; each passes through cells of the wall
+    in front of its own end.  With three grazed cells none at 10 degrees or more may be freed.
+    """
+    kept = {}
+    for graze in (0, 3):
+        grid = StaticDynamicMap(MapConfig(d_memory="text", explained_by=0, graze=graze, settle_seconds=None))
+        for k in range(6):  # the wall y = 1.05, from x = -1.5 to 6, from near
+            xs = np.arange(-1.5, 6.0, 0.05)
+            angles, ranges = np.arctan2(1.05 - 0.05, xs - 3.0), np.hypot(xs - 3.0, 1.0)
+            grid.update([3.0, 0.05, 0.0], Scan(angles, ranges, 50.0, 0.1 * k))
+        wall = np.stack([np.arange(-0.95, 5.0, 0.1), np.full(60, 1.05)], 1)
+        assert (grid.static().at(wall) > 2.2).all()
+        for k in range(40):  # then from its side, half a degree between beams: 11 degrees at 5 m
+            angles = np.deg2rad(np.arange(11.0, 60.0, 0.5) + 0.5 * (k % 2) - 0.25)
+            grid.update([0.0, 0.05, 0.0], Scan(angles, 1.0 / np.sin(angles), 50.0, 1.0 + 0.1 * k))
+        kept[graze] = float((grid.static().at(wall) > 2.2).mean())
+    assert kept[3] == 1.0
+    assert kept[0] < 0.95  # cells at small angles are lost
+
+
+def test_a_wall_that_was_freed_comes_back_beside_its_neighbours_and_a_person_does_not(backend: str) -> None:
+    """One cell of a wall was seen free.  Hit again, it is static after ``settle_beside``, not before.
+
+    The same hits on floor away from the wall leave it free: ``settle_seconds`` has not passed.
+    """
+    config = MapConfig(d_memory="text", explained_by=0, settle_beside=1.0, settle_seconds=10.0)
+    grid = StaticDynamicMap(config)
+    angles = np.arctan2([-0.1, 0.0, 0.1], 3.05)
+    beams = np.hypot([-0.1, 0.0, 0.1], 3.05)
+    past = np.array([beams[0], 4.05, beams[2]])  # the middle beam looks through the wall
+    for k in range(4):
+        grid.update([0.0, 0.05, 0.0], Scan(angles, past, 50.0, 0.2 * k))
+    freed, person = [[3.05, 0.05]], [[1.55, 0.05]]
+    assert p_at(grid.static(), 3.05) < 0.1
+    path = []
+    for k in range(8):
+        grid.update([0.0, 0.05, 0.0], Scan(angles, beams, 50.0, 1.0 + 0.2 * k))
+        path.append(float(grid.static().at(freed)[0]))
+    # hits at 1.0 ... 2.4 s: five before a second has passed, then three that count
+    assert all(v < -2.2 for v in path[:5])
+    assert path[5] == pytest.approx(math.log(4.0))
+    assert path[7] > 2.2
+    for k in range(8):
+        stands = Scan(angles, np.array([beams[0], 1.55, beams[2]]), 50.0, 3.0 + 0.2 * k)
+        grid.update([0.0, 0.05, 0.0], stands)
+    assert grid.static().at(person)[0] < -2.2

@@ -129,25 +129,44 @@ def beams(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.
     return start, ends, rng.random(n) < 0.6
 
 
+@pytest.mark.parametrize("graze", [0, 1, 3, 50])
 @pytest.mark.parametrize("seed", range(5))
-def test_marks_are_the_crossed_cells_and_hits_win(seed: int) -> None:
+def test_marks_are_the_crossed_cells_and_hits_win(seed: int, graze: int) -> None:
+    """Grazed are the cells within ``graze`` of the last crossed one, along the beam's longer axis."""
     start, ends, hit = beams(np.random.default_rng(seed), 150)  # more than one group
     window = np.zeros((40, 40), np.uint8)
-    rays.mark_beams(window, start, ends, hit)
+    rays.mark_beams(window, start, ends, hit, graze)
     expected = np.zeros((40, 40), np.uint8)
-    for e in ends:
+    for e, h in zip(ends, hit, strict=True):
         quantised = tuple(Fraction(int(np.rint(v * rays.QUANTA)), rays.QUANTA) for v in e)
-        for cell in exact_cells(tuple(map(Fraction, start)), quantised):
-            expected[cell] = rays.MISS
+        d = [quantised[a] - Fraction(start[a]) for a in range(2)]
+        axis = 0 if abs(d[0]) >= abs(d[1]) else 1
+        crossed = exact_cells(tuple(map(Fraction, start)), quantised)
+        last = (max if d[axis] >= 0 else min)((c[1 - axis] for c in crossed), default=0)
+        for cell in crossed:
+            near = h and graze > 0 and abs(cell[1 - axis] - last) <= graze
+            expected[cell] = max(expected[cell], rays.GRAZE if near else rays.MISS)
     for x, y in rays.end_cells(ends[hit]).tolist():
         expected[y, x] = rays.HIT
     np.testing.assert_array_equal(window, expected)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_a_beam_within_its_first_column_beside_a_long_one(seed: int) -> None:
+    """Beams are walked together, as many columns as the longest has."""
+    rng = np.random.default_rng(seed)
+    start = np.rint(rng.uniform(18, 22, 2) * rays.QUANTA) / rays.QUANTA
+    ends = np.rint(np.stack([start + rng.uniform(-0.9, 0.9, 2), [33.0, 4.0]]) * rays.QUANTA) / rays.QUANTA
+    window = np.zeros((40, 40), np.uint8)
+    rays.mark_beams(window, start, ends, np.zeros(2, dtype=bool))
+    crossed = [exact_cells(tuple(map(Fraction, start)), tuple(map(Fraction, e))) for e in ends]
+    assert {tuple(c) for c in np.argwhere(window).tolist()} == crossed[0] | crossed[1]
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_both_backends_visit_the_exact_cells(seed: int, backend: str) -> None:
-    """A map of zeros, 1 for a miss and 2 for a hit, is the picture of the scan."""
+    """A map of zeros, with the marks themselves as evidence, is the picture of the scan."""
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     start, ends, hit = beams(np.random.default_rng(seed), 70)
@@ -155,7 +174,7 @@ def test_both_backends_visit_the_exact_cells(seed: int, backend: str) -> None:
     rays.mark_beams(window, start, ends, hit)
     picture = np.zeros(1600)
     with _kernels.use_backend(backend):
-        apply_plain(picture, 40, start, ends, hit, np.array([1.0, 2.0]), 9.0)
+        apply_plain(picture, 40, start, ends, hit, np.array([rays.MISS, rays.HIT], float), 9.0)
     np.testing.assert_array_equal(picture.reshape(40, 40), window)
 
 
@@ -187,7 +206,7 @@ def test_beams_that_leave_the_map_are_refused(backend: str, end: tuple[float, fl
 
 def test_kernels_and_their_functions_have_the_same_constants() -> None:
     kernels = pytest.importorskip("vslam_ref._kernels.grids", reason="the twins need numba")
-    for name in ("QUANTA", "MAX_LENGTH", "UNSEEN", "MISS", "HIT", "TOO_LONG", "OUTSIDE"):
+    for name in ("QUANTA", "MAX_LENGTH", "UNSEEN", "GRAZE", "MISS", "HIT", "TOO_LONG", "OUTSIDE"):
         assert getattr(kernels, name) == getattr(rays, name)
     for name in ("FREE", "UNKNOWN", "OCCUPIED", "DECIDED_LOG_ODDS"):
         assert getattr(kernels, name) == getattr(log_odds, name)

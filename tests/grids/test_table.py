@@ -10,7 +10,7 @@ import pytest
 from vslam_ref.grids import InverseSensor
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, FREE, OCCUPIED, UNKNOWN
 
-MISS, HIT = 0, 1
+MISS, HIT, GRAZE = 0, 1, 2
 HIGH_S = {(UNKNOWN, HIT), (OCCUPIED, HIT)}
 HIGH_D = {"free": {(FREE, HIT)}, "unknown": {(UNKNOWN, HIT)}}
 
@@ -20,7 +20,7 @@ def test_the_table_is_high_where_the_page_says_and_low_elsewhere(where: str) -> 
     steps = InverseSensor().steps(where)  # type: ignore[arg-type]
     for table, high in ((steps.static, HIGH_S), (steps.dynamic, HIGH_D[where])):
         assert {(int(a), int(b)) for a, b in np.argwhere(table > 0)} == high
-        assert (table != 0).all()
+        assert (table[:, [MISS, HIT]] != 0).all()
 
 
 def test_the_reasons_of_the_values_are_true() -> None:
@@ -32,12 +32,25 @@ def test_the_reasons_of_the_values_are_true() -> None:
     assert abs(miss) < hit
     assert steps.dynamic[FREE, HIT] > DECIDED_LOG_ODDS
     assert steps.dynamic[FREE, HIT] + steps.dynamic[FREE, MISS] == pytest.approx(0.0, abs=1e-12)
+    graze = steps.static[:, GRAZE]
+    assert graze[FREE] == miss
+    assert graze[UNKNOWN] == pytest.approx(miss / 2, rel=0.05)
+    assert graze[OCCUPIED] == 0.0
+    np.testing.assert_array_equal(steps.dynamic[:, GRAZE], steps.dynamic[:, MISS])
     for f in dataclasses.fields(InverseSensor):
         assert f.metadata["reason"]
 
 
 @pytest.mark.parametrize(
-    "bad", [{"s_high": 0.5}, {"s_high": 1.0}, {"s_miss": 0.5}, {"d_low": 0.0}, {"d_high": float("nan")}]
+    "bad",
+    [
+        {"s_high": 0.5},
+        {"s_high": 1.0},
+        {"s_miss": 0.5},
+        {"s_graze": 0.5},
+        {"d_low": 0.0},
+        {"d_high": float("nan")},
+    ],
 )
 def test_values_on_the_wrong_side_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(bad))):

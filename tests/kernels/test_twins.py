@@ -169,11 +169,14 @@ def for_apply_plain(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 
 
 def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    """All states; cells never seen, and long not seen; hits that settle; walls that reach 0 or 1 cell."""
+    """All states; cells never seen, and long not seen; hits that settle; walls that reach 0 or 1 cell; grazing."""
     s, d = rng.uniform(-3, 3, (2, 2000))
     times = (rng.choice(t, 2000) for t in ([-np.inf, 7.0, 9.5], [-np.inf, 8.0, 9.5], [0.0, 5.0, 9.0]))
-    steps = rng.uniform(-2, 2, (2, 3, 2))
-    limits = np.array([6.0, 3.0, rng.choice([-1.0, 1.0]), rng.choice([3.0, np.inf]), 1.0, n % 2])
+    steps = rng.uniform(-2, 2, (2, 3, 3))
+    settle, graze = rng.choice([3.0, np.inf]), rng.choice([0.0, 2.0])
+    limits = np.array(
+        [6.0, 3.0, rng.choice([-1.0, 1.0]), settle, 1.0, n % 2, rng.choice([0.5, settle]), graze]
+    )
     return s, d, *times, 50, *for_grid(rng, B, n), *steps, limits, 10.0
 
 

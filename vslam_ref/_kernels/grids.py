@@ -13,7 +13,8 @@ from vslam_ref._kernels._signature import given, kernel
 
 QUANTA = 4096
 MAX_LENGTH = 16384
-UNSEEN, MISS, HIT, EXPLAINED = 0, 1, 2, 3
+UNSEEN, GRAZE, MISS, HIT = 0, 1, 2, 3
+EXPLAINED, BESIDE = 4, 8  # flags of a hit
 FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 DECIDED_LOG_ODDS = np.log(0.9 / (1.0 - 0.9))
 TOO_LONG = "a beam is not finite or spans more than 16384 cells; take a coarser resolution"
@@ -27,8 +28,8 @@ def _quanta(x):
 
 
 @njit(cache=True)
-def _walk(flat, columns, x0, y0, x1, y1):
-    """Mark MISS along one beam, given in quanta."""
+def _walk(flat, columns, x0, y0, x1, y1, grazing):
+    """Mark MISS along one beam, given in quanta, and GRAZE in its last ``grazing`` columns."""
     dx, dy = x1 - x0, y1 - y0
     sx = 1 if dx >= 0 else -1
     sy = 1 if dy >= 0 else -1
@@ -45,7 +46,9 @@ def _walk(flat, columns, x0, y0, x1, y1):
     run, rise = du * QUANTA, dv * QUANTA
     height = pv * du - pu * dv  # above the present row, in 1 / run
     climb = max((pv + dv + QUANTA - 1) // QUANTA, 1) - 1  # rows still to come
-    for _ in range(max((pu + du + QUANTA - 1) // QUANTA, 1) - 1):
+    steps = max((pu + du + QUANTA - 1) // QUANTA, 1) - 1
+    body = min(max(steps + 1 - grazing, 0), steps)
+    for _ in range(body):
         flat[at] = MISS
         height += rise
         flat[at + (across if height > run else 0)] = MISS  # the next row, too; not by a corner
@@ -53,16 +56,27 @@ def _walk(flat, columns, x0, y0, x1, y1):
         height -= run if up else 0
         climb -= up
         at += along + (across if up else 0)
-    flat[at] = MISS
+    for _ in range(body, steps):
+        flat[at] = max(flat[at], GRAZE)
+        height += rise
+        other = at + (across if height > run else 0)
+        flat[other] = max(flat[other], GRAZE)
+        up = height >= run
+        height -= run if up else 0
+        climb -= up
+        at += along + (across if up else 0)
+    last = GRAZE if grazing > 0 else MISS
+    flat[at] = max(flat[at], last)
     if climb > 0:
-        flat[at + across] = MISS
+        flat[at + across] = max(flat[at + across], last)
 
 
 @njit(cache=True)
-def _mark(flat, columns, start, ends, hit, low):
+def _mark(flat, columns, start, ends, hit, low, graze):
     x0, y0 = _quanta(start[0] - low[0]), _quanta(start[1] - low[1])
     for b in range(ends.shape[0]):
-        _walk(flat, columns, x0, y0, _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1]))
+        grazing = graze + 1 if graze > 0 and hit[b] else 0
+        _walk(flat, columns, x0, y0, _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1]), grazing)
     for b in range(ends.shape[0]):
         if hit[b]:
             x1, y1 = _quanta(ends[b, 0] - low[0]), _quanta(ends[b, 1] - low[1])
@@ -70,7 +84,7 @@ def _mark(flat, columns, start, ends, hit, low):
 
 
 @njit(cache=True)
-def _look(rows, columns, start, ends, hit):
+def _look(rows, columns, start, ends, hit, graze):
     """(window, its first column and row)."""
     for b in range(ends.shape[0]):
         for a in range(2):
@@ -86,14 +100,14 @@ def _look(rows, columns, start, ends, hit):
         raise ValueError(OUTSIDE)
     width, height = high[0] - low[0], high[1] - low[1]
     flat = np.zeros(height * width, np.uint8)
-    _mark(flat, width, start, ends, hit, low)
+    _mark(flat, width, start, ends, hit, low, graze)
     return flat.reshape((height, width)), low
 
 
 @kernel(LAYER, types.int64, given(1), given(2), given(1, types.boolean), given(1), types.float64)
 def apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
     """Twin of :func:`vslam_ref.grids.plain.apply_plain`."""
-    window, low = _look(log_odds.shape[0] // columns, columns, start, ends, hit)
+    window, low = _look(log_odds.shape[0] // columns, columns, start, ends, hit, 0)
     miss_adds, hit_adds = evidence[0], evidence[1]
     for r in range(window.shape[0]):
         first = (r + low[1]) * columns + low[0]
@@ -134,13 +148,17 @@ def _clipped(v, bound):
 def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
     """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
     s_bound, d_bound, lifetime, settle = limits[0], limits[1], limits[2], limits[3]
-    gap, reach = limits[4], int(limits[5])
-    window, low = _look(s.shape[0] // columns, columns, start, ends, hit)
-    if reach > 0:  # before S changes
+    gap, reach, beside, graze = limits[4], int(limits[5]), limits[6], int(limits[7])
+    window, low = _look(s.shape[0] // columns, columns, start, ends, hit, graze)
+    if reach > 0 or beside < settle:  # before S changes
         for r in range(window.shape[0]):
             for c in range(window.shape[1]):
-                if window[r, c] == HIT and _near_static(s, columns, r + low[1], c + low[0], reach):
-                    window[r, c] = EXPLAINED
+                if window[r, c] == HIT:
+                    row, column = r + low[1], c + low[0]
+                    if reach > 0 and _near_static(s, columns, row, column, reach):
+                        window[r, c] |= EXPLAINED
+                    if beside < settle and _near_static(s, columns, row, column, 1):
+                        window[r, c] |= BESIDE
     for r in range(window.shape[0]):
         first = (r + low[1]) * columns + low[0]
         for c in range(window.shape[1]):
@@ -158,10 +176,11 @@ def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, 
                 last_hit[at] = now
             elif now - last_hit[at] > gap:
                 last_hit[at] = -np.inf
-            if is_hit and state == FREE and now - since[at] >= settle:
+            if is_hit and state == FREE and now - since[at] >= (beside if look & BESIDE else settle):
                 old, state = 0.0, UNKNOWN
             prior = 0.0 if now - seen[at] > lifetime else d[at]
-            state = OCCUPIED if look == EXPLAINED else state
-            s[at] = _clipped(old + steps_s[state, is_hit], s_bound)
-            d[at] = _clipped(prior + steps_d[state, is_hit], d_bound)
+            state = OCCUPIED if look & EXPLAINED else state
+            kind = 2 if look == GRAZE else is_hit
+            s[at] = _clipped(old + steps_s[state, kind], s_bound)
+            d[at] = _clipped(prior + steps_d[state, kind], d_bound)
             seen[at] = now

@@ -9,7 +9,13 @@ free      hit          low           **high**           low
 unknown   hit          **high**      low                **high**
 occupied  hit          **high**      low                low
 any       miss         low           low                low
+free      graze        low           low                low
+unknown   graze        half a miss   low                low
+occupied  graze        nothing       low                low
 ========  ===========  ============  =================  ==========================================
+
+To *graze* a cell is to cross it just before the beam's own end (:data:`MapConfig.graze`, 0 for never).  A beam
+that meets a wall at a small angle runs through the wall's own cells first, and these misses say little.
 """
 
 from __future__ import annotations
@@ -28,7 +34,7 @@ WHERES: tuple[Where, ...] = ("free", "unknown")
 
 
 class Steps(NamedTuple):
-    """Log-odds that an observation adds: (3, 2), S_{t-1} free, unknown or occupied x (miss, hit)."""
+    """Log-odds that an observation adds: (3, 3), S_{t-1} free, unknown or occupied x (miss, hit, graze)."""
 
     static: Array
     dynamic: Array
@@ -55,6 +61,9 @@ class InverseSensor:
     s_miss: float = _value(
         0.3, "three misses free a cell (0.07 < 0.1); weaker than a hit, as beams graze walls"
     )
+    s_graze: float = _value(
+        0.4, "about half of a miss, in log-odds: at unknown cells a beam's last steps are mostly floor"
+    )
     d_high: float = _value(
         0.95, "one hit decides a cell of D (0.95 > 0.9): a thing that moves is there once only"
     )
@@ -80,17 +89,18 @@ class InverseSensor:
         Examples
         --------
         >>> steps = InverseSensor().steps("free")
-        >>> steps.static[FREE].round(2), steps.dynamic[FREE].round(2)  # (miss, hit)
-        (array([-0.85, -0.85]), array([-2.94,  2.94]))
+        >>> steps.static[FREE].round(2), steps.dynamic[FREE].round(2)  # (miss, hit, graze)
+        (array([-0.85, -0.85, -0.85]), array([-2.94,  2.94, -2.94]))
         """
         if d_high_where not in WHERES:
             raise ValueError(f"d_high_where={d_high_where!r}: must be one of {', '.join(WHERES)}")
-        static = np.empty((3, 2))
+        static = np.empty((3, 3))
         static[:, 0] = self.s_miss
+        static[[FREE, UNKNOWN, OCCUPIED], 2] = self.s_miss, self.s_graze, 0.5
         static[[UNKNOWN, OCCUPIED], 1] = self.s_high
         static[FREE, 1] = self.s_low
-        dynamic = np.empty((3, 2))
-        dynamic[:, 0] = self.d_miss
+        dynamic = np.empty((3, 3))
+        dynamic[:, [0, 2]] = self.d_miss
         dynamic[:, 1] = self.d_low
         dynamic[FREE if d_high_where == "free" else UNKNOWN, 1] = self.d_high
         return Steps(log_odds(static), log_odds(dynamic))

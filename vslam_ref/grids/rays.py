@@ -31,8 +31,8 @@ MAX_LENGTH = 16384
 """Cells per axis that a beam may span: 16384 * 4096 = 2^26, and products of two such numbers are exact."""
 GROUP = 64
 """Beams that are walked together."""
-UNSEEN, MISS, HIT = 0, 1, 2
-"""What a scan says of a cell."""
+UNSEEN, GRAZE, MISS, HIT = 0, 1, 2, 3
+"""What a scan says of a cell; the larger one counts.  GRAZE is a miss just before the beam's own end."""
 TOO_LONG = f"a beam is not finite or spans more than {MAX_LENGTH} cells; take a coarser resolution"
 OUTSIDE = "a beam leaves the map, or comes within a cell of its border; grow the map first"
 
@@ -157,13 +157,33 @@ def _rows_of_columns(w: Walks, beams: IntArray) -> _Rows:
     height /= w.run[beams, None]  # at the left line of the column
     enter = np.floor(height[:, :-1])
     enter[:, :1] = 0.0
+    enter[last == 0] = 0.0  # the first column, repeated
     leave = np.ceil(height[:, 1:])  # at the right line, seen from below
     leave -= 1.0
     leave[np.arange(len(last)), last] = w.last_row[beams]
     return _Rows(k[:, :-1], enter, np.maximum(leave, enter, out=leave))
 
 
-def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
+def _cut(w: Walks, columns: IntArray) -> Walks:
+    """Beams without their last ``columns`` (B,); those that had no more have none left."""
+    left = np.maximum(w.columns - columns, 0)
+    top = np.ceil((w.rise * left + w.offset) / w.run) - 1.0  # the row at which the last column is left
+    return w._replace(columns=left, last_row=np.where(columns > 0, np.maximum(top, 0.0), w.last_row))
+
+
+def _rows_of_last_columns(w: Walks, beams: IntArray, columns: int) -> _Rows:
+    """:func:`_rows_of_columns` for the last ``columns`` only; the first one is repeated if there are fewer."""
+    last = w.columns[beams, None] - 1
+    k = np.maximum(last - np.arange(columns), 0).astype(np.float64)
+    rise, offset, run = w.rise[beams, None], w.offset[beams, None], w.run[beams, None]
+    enter = np.where(k == 0, 0.0, np.floor((rise * k + offset) / run))
+    leave = np.where(k == last, w.last_row[beams, None], np.ceil((rise * (k + 1) + offset) / run) - 1.0)
+    return _Rows(k, enter, np.maximum(leave, enter))
+
+
+def mark_beams(
+    window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0
+) -> None:
     """Mark in ``window`` (rows, columns) what a scan says: MISS where beams cross, HIT at their ends.
 
     Parameters
@@ -176,16 +196,21 @@ def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArra
         (x, y) in cells from the window's corner.
     hit : ndarray of bool, shape (B,)
         Whether something is at the end.  The other beams were cut, or nothing came back.
+    graze : int
+        Cells before a hit, counted along the beam's longer axis, in which it leaves GRAZE and no MISS.
 
     Notes
     -----
     A cell in which one beam ends and which another crosses is a HIT: the scan is one observation,
-    and the thing need not fill the cell.
+    and the thing need not fill the cell.  A cell that one beam grazes and another misses is a MISS.
     """
-    np.maximum(window, _marks(window.shape[0], window.shape[1], start, ends, hit), out=window)
+    seen = _marks(window.shape[0], window.shape[1], start, ends, hit, graze)
+    np.maximum(window, seen, out=window)
 
 
-def _marks(rows: int, columns: int, start: Array, ends: Array, hit: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def _marks(
+    rows: int, columns: int, start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0
+) -> NDArray[np.uint8]:
     """What a scan says of a window that nothing was said of before."""
     w = walks(start, ends)
     strides = np.array([1, columns])
@@ -194,15 +219,23 @@ def _marks(rows: int, columns: int, start: Array, ends: Array, hit: NDArray[np.b
     across = np.where(w.steep, steps[:, 0], steps[:, 1])
     first = (w.start @ strides).astype(np.float64)
     marks = np.zeros(rows * columns, dtype=np.uint8)
-    order = np.argsort(w.columns)  # like lengths together
-    for beams in (order[n : n + GROUP] for n in range(0, len(order), GROUP)):
-        column, enter, leave = _rows_of_columns(w, beams)
-        column = column * along[beams, None]
+
+    def write(beams: IntArray, walked: _Rows, mark: int) -> None:
+        column = walked.column * along[beams, None]
         column += first[beams, None]
-        for row in (enter, leave):
+        for row in (walked.enter, walked.leave):
             row *= across[beams, None]
             row += column
-            marks[row.astype(np.int64)] = MISS
+            marks[row.astype(np.int64)] = mark
+
+    if graze > 0:
+        grazing = np.flatnonzero(hit)
+        write(grazing, _rows_of_last_columns(w, grazing, graze + 1), GRAZE)
+        w = _cut(w, np.where(hit, graze + 1, 0))
+    order = np.argsort(w.columns)  # like lengths together
+    order = order[np.searchsorted(w.columns[order], 1) :]
+    for beams in (order[n : n + GROUP] for n in range(0, len(order), GROUP)):
+        write(beams, _rows_of_columns(w, beams), MISS)
     marks[end_cells(ends[hit]) @ strides] = HIT
     return marks.reshape(rows, columns)
 
@@ -214,7 +247,7 @@ def end_cells(ends: Array) -> IntArray:
 
 
 class Look(NamedTuple):
-    """What a scan says of some rows and columns of a map: ``window`` holds UNSEEN, MISS or HIT."""
+    """What a scan says of some rows and columns of a map: ``window`` holds UNSEEN, GRAZE, MISS or HIT."""
 
     rows: slice
     columns: slice
@@ -228,7 +261,7 @@ class Look(NamedTuple):
         return row, column
 
 
-def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool_]) -> Look:
+def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0) -> Look:
     """Return what a scan says of a map of ``shape`` (rows, columns), in its bounding window.
 
     Other arguments as for :func:`mark_beams`.
@@ -244,5 +277,5 @@ def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool
     high = np.floor(np.maximum(ends.max(axis=0), start)).astype(np.int64) + 2
     if (low < 0).any() or high[0] > shape[1] or high[1] > shape[0]:
         raise ValueError(OUTSIDE)
-    window = _marks(int(high[1] - low[1]), int(high[0] - low[0]), start - low, ends - low, hit)
+    window = _marks(int(high[1] - low[1]), int(high[0] - low[0]), start - low, ends - low, hit, graze)
     return Look(slice(low[1], high[1]), slice(low[0], high[0]), window)

@@ -7,7 +7,7 @@ a cell *before* the scan, and its log-odds are added.
     L(D_t) = L(D | o_t, S_{t-1}) + L(D_{t-1})        d_memory = "formula"                       (A§4.3)
     L(D_t) = L(D | o_t, S_{t-1})                     d_memory = "text"
 
-Three rules are added, each with a switch:
+Four rules are added, each with a switch:
 
 * *lifetime*: a cell of D that was not looked at for ``d_lifetime`` seconds is unknown again.  D holds what is
   there now.
@@ -17,9 +17,12 @@ Three rules are added, each with a switch:
 * *settling* (the ageing variant): what was hit on free floor for ``settle_seconds``, and never missed later
   than ``hit_gap`` seconds after a hit, has come to stay.  Longer times without a look do not count.  S
   forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put
-  down on once-free floor is dynamic for ever.
+  down on once-free floor is dynamic for ever.  ``settle_beside`` is a shorter time for cells beside a decided
+  static one: what comes to stay there is mostly a wall that beams along it had freed.
+* *grazing*: in the last ``graze`` cells before its own end a beam leaves a weaker word than a miss (see
+  :mod:`inverse_sensor`).  0 is the table with two observations.
 
-:data:`AS_PRINTED` has none of the last two.
+:data:`AS_PRINTED` has none of the last three.
 """
 
 from __future__ import annotations
@@ -68,6 +71,14 @@ class MapConfig:
     settle_seconds: float | None = field(
         default=10.0, metadata={"reason": "people seldom stand as still as that; None: never", "unit": "s"}
     )
+    settle_beside: float | None = field(
+        default=None,
+        metadata={"reason": "as settle_seconds: with wrong poses a short time thickens walls", "unit": "s"},
+    )
+    graze: int = field(
+        default=0,
+        metadata={"reason": "never; 3 protects walls met at 10 degrees (0.5 / tan 10 = 3)", "unit": "cells"},
+    )
     d_lifetime: float = field(
         default=1.0, metadata={"reason": "at 1 m/s a person has left its cells by then", "unit": "s"}
     )
@@ -92,6 +103,10 @@ class MapConfig:
             raise ValueError(f"explained_by={self.explained_by!r} cells: must be between 0 and 10")
         if self.settle_seconds is not None and not self.settle_seconds > 0:
             raise ValueError(f"settle_seconds={self.settle_seconds!r}: must be positive, or None for never")
+        if self.settle_beside is not None and not self.settle_beside >= 0:
+            raise ValueError(f"settle_beside={self.settle_beside!r}: must be 0 s or more, or None")
+        if not 0 <= self.graze <= 100:
+            raise ValueError(f"graze={self.graze!r} cells: must be between 0 and 100")
         for name in ("d_lifetime", "hit_gap"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name}={getattr(self, name)!r} s: must be positive")
@@ -179,14 +194,19 @@ class StaticDynamicMap(Canvas):
 
 
 def limits(config: MapConfig) -> Array:
-    """Return what :func:`apply_scan` needs: bounds of S and D, lifetime, settling, reach of a wall.
+    """Return what :func:`apply_scan` needs (8,).
+
+    Bounds of S and D, lifetime, settling, gap of hits, reach of a wall, settling beside a wall, grazing.
 
     Without memory of D, its lifetime is negative: nothing is young enough.
     """
     bounds = log_odds([config.s_most, config.d_most])
     lifetime = config.d_lifetime if config.d_memory == "formula" else -1.0
     settle = math.inf if config.settle_seconds is None else config.settle_seconds
-    return np.array([*bounds, lifetime, settle, config.hit_gap, float(config.explained_by)])
+    beside = settle if config.settle_beside is None else min(config.settle_beside, settle)
+    return np.array(
+        [*bounds, lifetime, settle, config.hit_gap, float(config.explained_by), beside, float(config.graze)]
+    )
 
 
 @accelerated("grids:apply_scan")
@@ -224,19 +244,21 @@ def apply_scan(
         Where beams end, likewise; all inside.
     hit : ndarray of bool, shape (B,)
         Whether something is there.
-    steps_s, steps_d : ndarray, shape (3, 2)
+    steps_s, steps_d : ndarray, shape (3, 3)
         From :meth:`InverseSensor.steps`.
-    limits : ndarray, shape (6,)
+    limits : ndarray, shape (8,)
         From :func:`limits`.
     now : float
         Time, later than before.
     """
-    s_bound, d_bound, lifetime, settle, gap, reach = limits.tolist()
+    s_bound, d_bound, lifetime, settle, gap, reach, beside, graze = limits.tolist()
     whole = [layer.reshape(-1, columns) for layer in (s, d, seen, last_hit, since)]
-    look = rays.look(whole[0].shape, start, ends, hit)
+    look = rays.look(whole[0].shape, start, ends, hit, int(graze))
     rows, places, window = look
-    missed, hits = window == rays.MISS, look.hits
-    explained = _near_static(whole[0], hits[0] + rows.start, hits[1] + places.start, int(reach))
+    missed, grazed, hits = window == rays.MISS, window == rays.GRAZE, look.hits
+    at = hits[0] + rows.start, hits[1] + places.start
+    explained = _near_static(whole[0], *at, int(reach))
+    wait = np.where(_near_static(whole[0], *at, 1), beside, settle) if beside < settle else settle
     s, d, seen, last_hit, since = (layer[rows, places] for layer in whole)  # views
 
     # S_{t-1} in the cells that were hit
@@ -244,7 +266,7 @@ def apply_scan(
     unseen = now - seen[hits]
     unseen[unseen <= gap] = 0.0  # time at which nobody looked does not count
     began = np.where(last_hit[hits] == -np.inf, now, since[hits] + unseen)
-    settled = (states(s_hit) == FREE) & (now - began >= settle)
+    settled = (states(s_hit) == FREE) & (now - began >= wait)
     s_hit[settled] = 0.0
     state = np.where(explained, OCCUPIED, states(s_hit))
 
@@ -252,13 +274,17 @@ def apply_scan(
     d[stale] = 0.0
     d_hit = d[hits] + steps_d[state, 1]
 
-    d += missed * _of_state(s, steps_d[:, 0])
-    s += missed * _of_state(s, steps_s[:, 0])
+    added = [missed * _of_state(s, steps[:, 0]) for steps in (steps_d, steps_s)]
+    if graze > 0:
+        added[0] += grazed * _of_state(s, steps_d[:, 2])
+        added[1] += grazed * _of_state(s, steps_s[:, 2])
+    d += added[0]
+    s += added[1]
     d[hits], s[hits] = d_hit, s_hit + steps_s[state, 1]
     np.clip(s, -s_bound, s_bound, out=s)
     np.clip(d, -d_bound, d_bound, out=d)
     seen[window != rays.UNSEEN] = now
-    last_hit[missed & (now - last_hit > gap)] = -np.inf  # the visit is over
+    last_hit[(missed | grazed) & (now - last_hit > gap)] = -np.inf  # the visit is over
     since[hits], last_hit[hits] = began, now
 
 
