@@ -169,7 +169,7 @@ def for_apply_plain(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 
 
 def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    """All states; cells never seen, and long not seen; hits that settle; walls that reach 0 or 1 cell; grazing."""
+    """All states; cells never or long not seen; hits that settle; walls that reach 0 or 1 cell; grazing."""
     s, d = rng.uniform(-3, 3, (2, 2000))
     times = (rng.choice(t, 2000) for t in ([-np.inf, 7.0, 9.5], [-np.inf, 8.0, 9.5], [0.0, 5.0, 9.0]))
     steps = rng.uniform(-2, 2, (2, 3, 3))
