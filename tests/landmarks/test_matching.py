@@ -120,6 +120,9 @@ def test_predictions_that_mean_nothing_are_refused(make_grid: Callable[..., LogO
         match_scan(field, np.ones((5, 2)), [np.nan, 0, 0], COV)
     with pytest.raises(ValueError, match="sigma > 0"):
         MatchConfig(sigma=0.0)
+    for name in ("cut", "search_cut"):
+        with pytest.raises(ValueError, match=name):
+            MatchConfig(**{name: 0.0})
 
 
 def filter_with_landmarks(rng: np.random.Generator) -> Blocks:
@@ -191,7 +194,7 @@ def test_a_match_is_the_minimum_of_its_objective(make_grid: Callable[..., LogOdd
         cov = np.diag([sigma, sigma, sigma / 2]) ** 2
         predicted = pose + [0.06, 0.0, 0.0]
         found = match_scan(field, points, predicted, cov)
-        o = Objective(field, points, predicted, np.linalg.inv(cov), MatchConfig().sigma)
+        o = Objective(field, points, predicted, np.linalg.inv(cov), MatchConfig().sigma, MatchConfig().cut)
         least = minimize(lambda p, o=o: float(o.cost(p)[0]), found.pose, method="Nelder-Mead")
         np.testing.assert_allclose(found.pose, least.x, atol=1e-3)
         pulled.append(found.pose[0] - pose[0])

@@ -172,7 +172,7 @@ def _cut(w: Walks, columns: IntArray) -> Walks:
 
 
 def _rows_of_last_columns(w: Walks, beams: IntArray, columns: int) -> _Rows:
-    """:func:`_rows_of_columns` for the last ``columns`` only; where there are fewer, the first is repeated."""
+    """:func:`_rows_of_columns` for the last ``columns`` only; of fewer the first is repeated."""
     last = w.columns[beams, None] - 1
     k = np.maximum(last - np.arange(columns), 0).astype(np.float64)
     rise, offset, run = w.rise[beams, None], w.offset[beams, None], w.run[beams, None]

@@ -3,6 +3,10 @@
 Two steps.  *Correlative*: try all poses of a small box around the prediction, and keep the best.  *Refining*:
 Gauss-Newton on robust squared distances plus the prediction, which gives the most probable pose and the
 information that the scan alone brings.
+
+Where a distance stops to count is one number for the search (``search_cut``, wide: it must feel walls from
+the corners of its box) and another for the refinement (``cut``, a cell: what lies farther from a wall is
+something else).  Neither is the standard deviation ``sigma``, which weighs the scan against the prediction.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.estimation.robust import Loss, tuned
+from vslam_ref.estimation.robust import Tukey
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.field import (
     DistanceField,
@@ -37,6 +41,13 @@ class MatchConfig:
         default=0.05,
         metadata={"reason": "a cell's half side, with the range noise far below it", "unit": "m"},
     )
+    cut: float = field(
+        default=0.1,
+        metadata={"reason": "a cell: farther from what is static is something else; inf: none is", "unit": "m"},
+    )
+    search_cut: float = field(
+        default=0.3, metadata={"reason": "three cells: twice the box's steps, at a lever of 5 m", "unit": "m"}
+    )
     window: float = field(
         default=0.2, metadata={"reason": "twice the worst step of the odometry", "unit": "m"}
     )
@@ -51,6 +62,8 @@ class MatchConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        if not (self.cut > 0 and self.search_cut > 0):
+            raise ValueError(f"cut={self.cut}, search_cut={self.search_cut}: need metres > 0 (inf: no cut)")
         if not (self.sigma > 0 and self.window >= 0 and self.window_angle >= 0 and self.steps >= 0):
             raise ValueError("need sigma > 0 and window, window_angle, steps >= 0")
         if self.least_points < 3 or self.iterations < 1:
@@ -112,8 +125,8 @@ class Objective(NamedTuple):
     predicted : ndarray, shape (3,)
     prior : ndarray, shape (3, 3)
         Inverse of the prediction's covariance.
-    sigma : float
-        Metres.
+    sigma, cut : float
+        Standard deviation of a distance, and where distances stop to count; metres.
     """
 
     field: DistanceField
@@ -121,11 +134,12 @@ class Objective(NamedTuple):
     predicted: Array
     prior: Array
     sigma: float
+    cut: float
 
     @property
-    def loss(self) -> Loss:
-        """Tukey's, for scalars, scaled to metres."""
-        return tuned("tukey").scaled(self.sigma)
+    def loss(self) -> Tukey:
+        """Tukey's, of distances in metres."""
+        return Tukey(self.cut)
 
     def cost(self, poses: ArrayLike) -> Array:
         """Costs (k,) of poses (k, 3). Implements :eq:`eq-field-map`."""
@@ -194,8 +208,8 @@ def match_scan(
         raise ValueError(
             f"prediction {predicted.shape} and covariance {cov.shape}: need finite (3,) and (3, 3)"
         )
-    o = Objective(field, points, predicted, np.linalg.inv(cov), c.sigma)
-    pose = correlative(o, c)
+    o = Objective(field, points, predicted, np.linalg.inv(cov), c.sigma, c.cut)
+    pose = correlative(o._replace(cut=c.search_cut), c)
     now = float(o.cost(pose)[0])
     for iteration in range(1, c.iterations + 1):
         r = scan_residuals_with_jacobians(pose, points, field)

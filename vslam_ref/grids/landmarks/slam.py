@@ -22,15 +22,15 @@ from numpy.typing import ArrayLike, NDArray
 from vslam_ref.filters import observation
 from vslam_ref.filters.ekf_slam import EkfSlam
 from vslam_ref.filters.vehicle import Increment
-from vslam_ref.geometry import so2
+from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.association import NONE, Signature, associate, look_alike
-from vslam_ref.grids.landmarks.field import distance_field
+from vslam_ref.grids.landmarks.field import DistanceField, distance_field, sample
 from vslam_ref.grids.landmarks.landmark_map import Landmark, LandmarkConfig, LandmarkMap
 from vslam_ref.grids.landmarks.lines import CornerConfig, Corners, scan_corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig
 from vslam_ref.grids.landmarks.matching import Match, MatchConfig, match_scan, thin
 from vslam_ref.grids.landmarks.pose_update import pose_measurement, pose_update
-from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
 from vslam_ref.grids.plain import PlainMap
 from vslam_ref.grids.scan import ScanLike, sort_beams
 from vslam_ref.grids.static_dynamic import MapConfig, StaticDynamicMap
@@ -47,13 +47,19 @@ class GridSlamConfig:
     match: bool = field(
         default=True, metadata={"reason": "scan against map, the second way of A4.4's localisation"}
     )
+    leave_out_moving: bool = field(
+        default=False,
+        metadata={"reason": "a matcher with a cut ignores them anyway; True: beams that D takes for moving"},
+    )
     landmarks: bool = field(default=True, metadata={"reason": "A4.4's landmarks"})
     map: MapConfig = field(default_factory=MapConfig, metadata={"reason": "see there"})
     matching: MatchConfig = field(default_factory=MatchConfig, metadata={"reason": "see there"})
     corners: CornerConfig = field(default_factory=CornerConfig, metadata={"reason": "see there"})
     corners_of_s: MapCornerConfig = field(default_factory=MapCornerConfig, metadata={"reason": "see there"})
     choice: LandmarkConfig = field(default_factory=LandmarkConfig, metadata={"reason": "see there"})
-    field_reach: float = field(default=0.5, metadata={"reason": "twice where the loss ends", "unit": "m"})
+    field_reach: float = field(
+        default=0.5, metadata={"reason": "more than where the search's loss ends", "unit": "m"}
+    )
 
 
 class Step(NamedTuple):
@@ -179,9 +185,12 @@ class GridSlam:
         c, b = self.config, self.filter.blocks
         used = np.isfinite(ranges) & (ranges > 0) & (ranges < max_range)
         ends = ranges[used, None] * np.stack([np.cos(angles[used]), np.sin(angles[used])], 1)
-        points = thin(ends, c.map.resolution)
         predicted, cov = b.x_p[0].copy(), b.P_pp[0].copy()
-        found = match_scan(distance_field(self.static(), c.field_reach), points, predicted, cov, c.matching)
+        field = distance_field(self.static(), c.field_reach)
+        if c.leave_out_moving:
+            ends = ends[~on_moving(se2.act(predicted, ends), self.static(), field)]
+        points = thin(ends, c.map.resolution)
+        found = match_scan(field, points, predicted, cov, c.matching)
         if found.reason == "converged":
             pose_update(b, *pose_measurement(found.pose, found.information, predicted, cov))
         return found
@@ -222,6 +231,16 @@ class GridSlam:
         if len(chosen.id):
             self.filter.update(chosen.id, corners.xy[chosen.corner][None], corners.cov[chosen.corner])
         return chosen.id
+
+
+def on_moving(points: Array, static: LogOddsGrid, field: DistanceField) -> NDArray[np.bool_]:
+    """Whether beams that end at ``points`` (n, 2) end on something that moves: D would be high there.
+
+    D is high where S was free.  Within one and a half cells of what is static a wall is as likely, since the
+    pose is only predicted yet.
+    """
+    on_floor = static.at(points) < -DECIDED_LOG_ODDS
+    return np.asarray(on_floor & (sample(points, field) > 1.5 * field.resolution))
 
 
 def _check(increment: Increment | None, scan: ScanLike) -> None:
