@@ -23,6 +23,7 @@ STATIC, MOVING, ROBOT, MARK = style.BLACK, style.VERMILION, style.BLUE, style.GR
 MODES: dict[str, style.Look] = {
     "separated": style.Look("S and D", style.BLUE, "-"),
     "plain": style.Look("plain grid", style.VERMILION, "--"),
+    "ideal": style.Look("moving beams left out by the truth", style.BLACK, ":"),
     "forbidden": style.Look("taken from S, withdrawn when wrong", style.BLUE, "-"),
     "allowed": style.Look("any corner", style.VERMILION, "--"),
     "odometry": style.Look("odometry alone", style.GREY, ":"),
@@ -198,25 +199,33 @@ def separation_figure(
     return figure
 
 
-def localisation_figure(densities: Array, rmse: Array, errors: Array, f_scores: Array) -> Figure:
+def localisation_figure(
+    densities: Array, rmse: Array, squares: Array, errors: Array, f_scores: Array
+) -> Figure:
     """Draw the position error over the crowd's density, and D over the error of the poses.
 
     Parameters
     ----------
     densities : ndarray, shape (d,)
-    rmse : ndarray, shape (d, runs, 2)
-        With separation and with a plain grid, metres.
+    rmse : ndarray, shape (d, runs, 3)
+        With separation, with a plain grid, and with perfect knowledge of what moves, metres.
+    squares : ndarray, shape (runs, 3)
+        The same with least squares, at the last density.
     errors : ndarray, shape (e,)
         Standard deviations of the poses from which maps were drawn, metres.
     f_scores : ndarray, shape (runs, e)
     """
     with style.house_style():
         figure, (left, right) = style.new_figure(4.0, 2)
-        for m, mode in enumerate(("separated", "plain")):
+        beside = 100 * densities[-1] + 3.0
+        for m, mode in enumerate(("separated", "plain", "ideal")):
             look = MODES[mode]
             left.plot(100 * densities, rmse[:, :, m], ".", color=look.colour, ms=6, alpha=0.6)
             mean = rmse[:, :, m].mean(axis=1)
             left.plot(100 * densities, mean, look.line, color=look.colour, lw=2, label=look.name)
+            left.plot(np.full(len(squares), beside + m), squares[:, m], ".", color=look.colour, alpha=0.6)
+            left.plot(beside + m, squares[:, m].mean(), "D", color=look.colour, mfc="white", ms=8)
+        left.plot([], [], "D", color=style.GREY, mfc="white", ms=8, label="with least squares")
         left.set(title="position error; dots: runs", xlabel="free floor covered by bodies [%]", yscale="log")
         left.set_ylabel("RMSE of the position [m]")
         _plain_numbers(left)

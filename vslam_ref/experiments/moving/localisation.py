@@ -1,4 +1,10 @@
-"""Pose and maps together, with and without the separation: one run.
+"""Pose and maps together: separated, in a plain grid, and with perfect knowledge of what moves; one run.
+
+*Separated* means: the robot localises in S, and beams that end on what D takes for moving are left out.
+*Plain* is one occupancy grid and all beams.  *Ideal* is what no separation can surpass: the truth says which
+beams end on something that moves, and these are left out of the map and of the matching alike.
+
+Each is run with the matcher as it is, and, where asked for, with least squares: nothing is too far to count.
 
 The dynamic map is judged *beam by beam*: does D, at the place where the beam ends by the robot's own
 estimate, say that something moves, and did the beam end on something that moves?  This needs no common
@@ -16,14 +22,15 @@ from numpy.typing import NDArray
 
 from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
 from vslam_ref.geometry import se2
-from vslam_ref.grids import MapConfig, StaticDynamicMap
+from vslam_ref.grids import MapConfig, Scan, StaticDynamicMap
 from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
 from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording, simulate, turned
 
 Array = NDArray[np.float64]
 
-MODES = ("separated", "plain")
+MODES = ("separated", "plain", "ideal")
+MATCHERS = ("robust", "squares")
 SPOILED = 0.1
 """Metres: the error of the poses at which the dynamic map is judged."""
 
@@ -56,7 +63,9 @@ class LocalisationConfig:
         metadata={"reason": "an office; half a degree, as indoor scanners have"},
     )
     slam: GridSlamConfig = field(
-        default_factory=lambda: GridSlamConfig(landmarks=False, map=MapConfig(d_memory="text")),
+        default_factory=lambda: GridSlamConfig(
+            landmarks=False, leave_out_moving=True, map=MapConfig(d_memory="text")
+        ),
         metadata={
             "reason": "scan matching alone: the map is the one difference; landmarks have their own study"
         },
@@ -75,12 +84,13 @@ class LocalisationConfig:
 
 
 class Task(NamedTuple):
-    """One run at one density; ``spoil``: draw maps from wrong poses too."""
+    """One run at one density; ``spoil``: draw maps from wrong poses too; ``squares``: match so, too."""
 
     config: LocalisationConfig
     density: float
     seed: np.random.SeedSequence
     spoil: bool
+    squares: bool = False
 
 
 class Run(NamedTuple):
@@ -88,8 +98,10 @@ class Run(NamedTuple):
 
     Attributes
     ----------
-    rmse, final : ndarray, shape (2,)
-        Position error over the run (root mean square) and at its end, metres, for both modes.
+    rmse, final : ndarray, shape (3,)
+        Position error over the run (root mean square) and at its end, metres, for the modes.
+    squares : ndarray, shape (3,)
+        RMSE with least squares; NaN where not asked for.
     beams : ndarray, shape (3,)
         Of the separated mode: beams rightly called moving, called moving, on moving things.
     spoiled : ndarray, shape (errors, 3)
@@ -100,6 +112,7 @@ class Run(NamedTuple):
 
     rmse: Array
     final: Array
+    squares: Array
     beams: Array
     spoiled: Array
     on_people: float
@@ -124,14 +137,22 @@ def f_score(counts: Array) -> Array:
     return score
 
 
+def without_moving(recording: Recording, k: int) -> Scan:
+    """Scan k without the beams that end on something that moves, by the truth."""
+    scan, owner = scan_of(recording, k), recording.owner[k]
+    moves = (owner >= 0) & recording.moving[k, np.maximum(owner, 0)]
+    return scan._replace(ranges=np.where(moves, np.nan, scan.ranges))
+
+
 def localise(
-    recording: Recording, config: GridSlamConfig, warm_up: int = 25
+    recording: Recording, config: GridSlamConfig, warm_up: int = 25, ideal: bool = False
 ) -> tuple[Array, Array, GridSlam]:
     """Estimated poses (n, 3), beam counts (3,) of D after ``warm_up`` scans (0 for a plain grid), loop."""
     slam = GridSlam(recording.poses[0], config)
     poses, beams = np.empty_like(recording.poses), np.zeros(3)
     for k in range(len(recording)):
-        poses[k] = slam.step(increment_of(recording, k), scan_of(recording, k)).pose
+        scan = without_moving(recording, k) if ideal else scan_of(recording, k)
+        poses[k] = slam.step(increment_of(recording, k), scan).pose
         if isinstance(slam.maps, StaticDynamicMap) and k >= warm_up:
             beams += beam_counts(recording, k, poses[k], slam.maps)
     return poses, beams, slam
@@ -156,22 +177,39 @@ def spoiled_counts(
     return total
 
 
+def position_errors(recording: Recording, poses: Array) -> tuple[float, float]:
+    """Root mean square over the run, and at its end, metres."""
+    off = np.hypot(*(poses - recording.poses)[:, :2].T)
+    return float(np.sqrt(np.mean(off**2))), float(off[-1])
+
+
 def simulate_run(task: Task) -> Run:
-    """One run at one density, both modes on the same recording."""
+    """One run at one density, all modes on the same recording."""
     config = task.config
     crowd = dataclasses.replace(config.world.crowd, density=task.density)
     rng = generator(task.seed)
     recording = turned(simulate(dataclasses.replace(config.world, crowd=crowd), rng), config.turn)
-    rmse, final, beams = np.empty(2), np.empty(2), np.zeros(3)
-    for i, mode in enumerate(MODES):
-        poses, counted, _ = localise(
-            recording, dataclasses.replace(config.slam, separate=mode == "separated")
-        )
-        off = np.hypot(*(poses - recording.poses)[:, :2].T)
-        rmse[i], final[i] = np.sqrt(np.mean(off**2)), off[-1]
-        beams += counted
+    errors = np.full((len(MATCHERS), len(MODES), 2), np.nan)
+    beams = np.zeros(3)
+    for m, matcher in enumerate(MATCHERS if task.squares else MATCHERS[:1]):
+        for i, mode in enumerate(MODES):
+            poses, counted, _ = localise(
+                recording, mode_of(config.slam, matcher, mode), ideal=mode == "ideal"
+            )
+            errors[m, i] = position_errors(recording, poses)
+            if (matcher, mode) == ("robust", "separated"):
+                beams = counted
     spoiled = np.zeros((len(config.errors), 3))
     if task.spoil:
         for i, sigma in enumerate(config.errors):
             spoiled[i] = spoiled_counts(recording, config.slam.map, sigma, config.lever, rng)
-    return Run(rmse, final, beams, spoiled, recording.share_on_people)
+    rmse, final = errors[0].T
+    return Run(rmse, final, errors[1, :, 0], beams, spoiled, recording.share_on_people)
+
+
+def mode_of(config: GridSlamConfig, matcher: str, mode: str) -> GridSlamConfig:
+    """The loop of a mode; for least squares nothing is too far to count."""
+    matching = config.matching
+    if matcher == "squares":
+        matching = dataclasses.replace(matching, cut=np.inf, search_cut=np.inf)
+    return dataclasses.replace(config, separate=mode != "plain", matching=matching)

@@ -43,7 +43,7 @@ class MatchConfig:
     )
     cut: float = field(
         default=0.1,
-        metadata={"reason": "a cell: farther from what is static is something else; inf: none is", "unit": "m"},
+        metadata={"reason": "a cell: what is farther off is something else; inf: nothing is", "unit": "m"},
     )
     search_cut: float = field(
         default=0.3, metadata={"reason": "three cells: twice the box's steps, at a lever of 5 m", "unit": "m"}

@@ -187,7 +187,7 @@ class GridSlam:
         ends = ranges[used, None] * np.stack([np.cos(angles[used]), np.sin(angles[used])], 1)
         predicted, cov = b.x_p[0].copy(), b.P_pp[0].copy()
         field = distance_field(self.static(), c.field_reach)
-        if c.leave_out_moving:
+        if c.leave_out_moving and c.separate:
             ends = ends[~on_moving(se2.act(predicted, ends), self.static(), field)]
         points = thin(ends, c.map.resolution)
         found = match_scan(field, points, predicted, cov, c.matching)
