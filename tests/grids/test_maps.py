@@ -85,9 +85,14 @@ class Slow:
             r = c.explained_by
             near = [(cell[0] + i, cell[1] + j) for i in range(-r, r + 1) for j in range(-r, r + 1)]
             wait = math.inf if c.settle_seconds is None else c.settle_seconds
-            beside = [(cell[0] + i, cell[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-            if c.settle_beside is not None and any(before.get(n) == OCCUPIED for n in beside):
-                wait = min(wait, c.settle_beside)
+            lines = [
+                [before.get((cell[0] + n * i, cell[1] + n * j)) for n in (1, 2)]
+                for i in (-1, 0, 1)
+                for j in (-1, 0, 1)
+                if (i, j) != (0, 0)
+            ]
+            if c.settle_in_line is not None and [OCCUPIED, OCCUPIED] in lines:
+                wait = min(wait, c.settle_in_line)
             settled = now - m["since"] >= wait
             if state == FREE and settled:
                 m["s"], state = 0.0, UNKNOWN
@@ -131,8 +136,8 @@ CONFIGS = {
     "text": MapConfig(d_memory="text", explained_by=0),
     "unknown": MapConfig(d_high_where="unknown", settle_seconds=None),
     "text-unknown": MapConfig(d_memory="text", d_high_where="unknown", usable_range=1.9, no_return="free"),
-    "grazing": MapConfig(d_memory="text", explained_by=0, graze=3, settle_beside=0.5, settle_seconds=2.0),
-    "grazing-wide": MapConfig(graze=8, settle_beside=0.0, explained_by=2, settle_seconds=None),
+    "grazing": MapConfig(d_memory="text", explained_by=0, graze=3, settle_in_line=0.3, settle_seconds=2.0),
+    "grazing-wide": MapConfig(graze=8, settle_in_line=0.0, explained_by=2, settle_seconds=None),
     "wide": MapConfig(explained_by=2, settle_seconds=1.0, d_lifetime=0.5, resolution=0.07),
 }
 
@@ -383,7 +388,7 @@ def test_a_refused_scan_leaves_the_map_as_it_was(pose: list, scan: Scan, what: s
         {"d_high_where": "occupied"},
         {"explained_by": -1},
         {"settle_seconds": 0.0},
-        {"settle_beside": -1.0},
+        {"settle_in_line": -1.0},
         {"graze": -1},
         {"d_lifetime": 0.0},
         {"hit_gap": 0.0},
@@ -442,29 +447,32 @@ def test_a_wall_met_at_a_small_angle_keeps_its_cells_where_grazing_counts_less(b
     assert kept[0] < 0.95  # cells at small angles are lost
 
 
-def test_a_wall_that_was_freed_comes_back_beside_its_neighbours_and_a_person_does_not(backend: str) -> None:
-    """One cell of a wall was seen free.  Hit again, it is static after ``settle_beside``, not before.
+def test_a_wall_that_was_freed_comes_back_in_its_line_and_a_person_at_the_wall_does_not(
+    backend: str,
+) -> None:
+    """A cell of a wall was seen free.  Hit again, it is static after ``settle_in_line``, not before.
 
-    The same hits on floor away from the wall leave it free: ``settle_seconds`` has not passed.
+    Somebody who stands against the wall for as long continues no line: S keeps that cell free.
     """
-    config = MapConfig(d_memory="text", explained_by=0, settle_beside=1.0, settle_seconds=10.0)
+    config = MapConfig(d_memory="text", explained_by=0, settle_in_line=1.0, settle_seconds=10.0)
     grid = StaticDynamicMap(config)
-    angles = np.arctan2([-0.1, 0.0, 0.1], 3.05)
-    beams = np.hypot([-0.1, 0.0, 0.1], 3.05)
-    past = np.array([beams[0], 4.05, beams[2]])  # the middle beam looks through the wall
+    heights = np.arange(-0.3, 0.31, 0.1)
+    angles, beams = np.arctan2(heights, 3.0), np.hypot(heights, 3.0)
+    past, stands = beams.copy(), beams.copy()
+    past[3], stands[3] = 4.0, 2.9  # the middle beam looks through the wall; or meets somebody before it
     for k in range(4):
-        grid.update([0.0, 0.05, 0.0], Scan(angles, past, 50.0, 0.2 * k))
-    freed, person = [[3.05, 0.05]], [[1.55, 0.05]]
+        grid.update([0.05, 0.05, 0.0], Scan(angles, past, 50.0, 0.2 * k))
+    freed, person = [[3.05, 0.05]], [[2.95, 0.05]]
     assert p_at(grid.static(), 3.05) < 0.1
+    assert p_at(grid.static(), 2.95) < 0.1
     path = []
     for k in range(8):
-        grid.update([0.0, 0.05, 0.0], Scan(angles, beams, 50.0, 1.0 + 0.2 * k))
+        grid.update([0.05, 0.05, 0.0], Scan(angles, beams, 50.0, 1.0 + 0.2 * k))
         path.append(float(grid.static().at(freed)[0]))
     # hits at 1.0 ... 2.4 s: five before a second has passed, then three that count
     assert all(v < -2.2 for v in path[:5])
     assert path[5] == pytest.approx(math.log(4.0))
     assert path[7] > 2.2
     for k in range(8):
-        stands = Scan(angles, np.array([beams[0], 1.55, beams[2]]), 50.0, 3.0 + 0.2 * k)
-        grid.update([0.0, 0.05, 0.0], stands)
+        grid.update([0.05, 0.05, 0.0], Scan(angles, stands, 50.0, 3.0 + 0.2 * k))
     assert grid.static().at(person)[0] < -2.2

@@ -14,7 +14,7 @@ from vslam_ref._kernels._signature import given, kernel
 QUANTA = 4096
 MAX_LENGTH = 16384
 UNSEEN, GRAZE, MISS, HIT = 0, 1, 2, 3
-EXPLAINED, BESIDE = 4, 8  # flags of a hit
+EXPLAINED, IN_LINE = 4, 8  # flags of a hit
 FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 DECIDED_LOG_ODDS = np.log(0.9 / (1.0 - 0.9))
 TOO_LONG = "a beam is not finite or spans more than 16384 cells; take a coarser resolution"
@@ -130,6 +130,18 @@ def _near_static(s, columns, row, column, reach):
 
 
 @njit(cache=True)
+def _continues_line(s, columns, row, column):
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            r, c = row + 2 * i, column + 2 * j
+            if (i != 0 or j != 0) and 0 <= r < s.shape[0] // columns and 0 <= c < columns:
+                near, next_but_one = s[(row + i) * columns + column + j], s[r * columns + c]
+                if near > DECIDED_LOG_ODDS and next_but_one > DECIDED_LOG_ODDS:
+                    return True
+    return False
+
+
+@njit(cache=True)
 def _state(log_odds):
     if log_odds > DECIDED_LOG_ODDS:
         return OCCUPIED
@@ -148,17 +160,17 @@ def _clipped(v, bound):
 def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
     """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
     s_bound, d_bound, lifetime, settle = limits[0], limits[1], limits[2], limits[3]
-    gap, reach, beside, graze = limits[4], int(limits[5]), limits[6], int(limits[7])
+    gap, reach, in_line, graze = limits[4], int(limits[5]), limits[6], int(limits[7])
     window, low = _look(s.shape[0] // columns, columns, start, ends, hit, graze)
-    if reach > 0 or beside < settle:  # before S changes
+    if reach > 0 or in_line < settle:  # before S changes
         for r in range(window.shape[0]):
             for c in range(window.shape[1]):
                 if window[r, c] == HIT:
                     row, column = r + low[1], c + low[0]
                     if reach > 0 and _near_static(s, columns, row, column, reach):
                         window[r, c] |= EXPLAINED
-                    if beside < settle and _near_static(s, columns, row, column, 1):
-                        window[r, c] |= BESIDE
+                    if in_line < settle and _continues_line(s, columns, row, column):
+                        window[r, c] |= IN_LINE
     for r in range(window.shape[0]):
         first = (r + low[1]) * columns + low[0]
         for c in range(window.shape[1]):
@@ -176,7 +188,7 @@ def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, 
                 last_hit[at] = now
             elif now - last_hit[at] > gap:
                 last_hit[at] = -np.inf
-            if is_hit and state == FREE and now - since[at] >= (beside if look & BESIDE else settle):
+            if is_hit and state == FREE and now - since[at] >= (in_line if look & IN_LINE else settle):
                 old, state = 0.0, UNKNOWN
             prior = 0.0 if now - seen[at] > lifetime else d[at]
             state = OCCUPIED if look & EXPLAINED else state

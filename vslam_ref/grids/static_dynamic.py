@@ -17,8 +17,9 @@ Four rules are added, each with a switch:
 * *settling* (the ageing variant): what was hit on free floor for ``settle_seconds``, and never missed later
   than ``hit_gap`` seconds after a hit, has come to stay.  Longer times without a look do not count.  S
   forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put
-  down on once-free floor is dynamic for ever.  ``settle_beside`` is a shorter time for cells beside a decided
-  static one: what comes to stay there is mostly a wall that beams along it had freed.
+  down on once-free floor is dynamic for ever.  ``settle_in_line`` is a shorter time for cells that continue
+  a line: the next cell and the one behind it, in one of eight directions, are decided static.  What comes to stay
+  there is mostly a wall that beams along it had freed; somebody who leans on a wall continues no line.
 * *grazing*: in the last ``graze`` cells before its own end a beam leaves a weaker word than a miss (see
   :mod:`inverse_sensor`).  0 is the table with two observations.
 
@@ -71,7 +72,7 @@ class MapConfig:
     settle_seconds: float | None = field(
         default=10.0, metadata={"reason": "people seldom stand as still as that; None: never", "unit": "s"}
     )
-    settle_beside: float | None = field(
+    settle_in_line: float | None = field(
         default=None,
         metadata={"reason": "as settle_seconds: with wrong poses a short time thickens walls", "unit": "s"},
     )
@@ -103,8 +104,8 @@ class MapConfig:
             raise ValueError(f"explained_by={self.explained_by!r} cells: must be between 0 and 10")
         if self.settle_seconds is not None and not self.settle_seconds > 0:
             raise ValueError(f"settle_seconds={self.settle_seconds!r}: must be positive, or None for never")
-        if self.settle_beside is not None and not self.settle_beside >= 0:
-            raise ValueError(f"settle_beside={self.settle_beside!r}: must be 0 s or more, or None")
+        if self.settle_in_line is not None and not self.settle_in_line >= 0:
+            raise ValueError(f"settle_in_line={self.settle_in_line!r}: must be 0 s or more, or None")
         if not 0 <= self.graze <= 100:
             raise ValueError(f"graze={self.graze!r} cells: must be between 0 and 100")
         for name in ("d_lifetime", "hit_gap"):
@@ -115,6 +116,8 @@ class MapConfig:
                 raise ValueError(f"{name}={getattr(self, name)!r}: must lie between {least:g} and 1")
 
 
+EIGHT = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+"""Directions to the neighbours of a cell."""
 AS_PRINTED = MapConfig(explained_by=0, settle_seconds=None)
 """The table of :mod:`inverse_sensor` and nothing else, but the lifetime of D."""
 
@@ -196,16 +199,16 @@ class StaticDynamicMap(Canvas):
 def limits(config: MapConfig) -> Array:
     """Return what :func:`apply_scan` needs (8,).
 
-    Bounds of S and D, lifetime, settling, gap of hits, reach of a wall, settling beside a wall, grazing.
+    Bounds of S and D, lifetime, settling, gap of hits, reach of a wall, settling in a line, grazing.
 
     Without memory of D, its lifetime is negative: nothing is young enough.
     """
     bounds = log_odds([config.s_most, config.d_most])
     lifetime = config.d_lifetime if config.d_memory == "formula" else -1.0
     settle = math.inf if config.settle_seconds is None else config.settle_seconds
-    beside = settle if config.settle_beside is None else min(config.settle_beside, settle)
+    in_line = settle if config.settle_in_line is None else min(config.settle_in_line, settle)
     return np.array(
-        [*bounds, lifetime, settle, config.hit_gap, float(config.explained_by), beside, float(config.graze)]
+        [*bounds, lifetime, settle, config.hit_gap, float(config.explained_by), in_line, float(config.graze)]
     )
 
 
@@ -251,14 +254,14 @@ def apply_scan(
     now : float
         Time, later than before.
     """
-    s_bound, d_bound, lifetime, settle, gap, reach, beside, graze = limits.tolist()
+    s_bound, d_bound, lifetime, settle, gap, reach, in_line, graze = limits.tolist()
     whole = [layer.reshape(-1, columns) for layer in (s, d, seen, last_hit, since)]
     look = rays.look(whole[0].shape, start, ends, hit, int(graze))
     rows, places, window = look
     missed, grazed, hits = window == rays.MISS, window == rays.GRAZE, look.hits
     at = hits[0] + rows.start, hits[1] + places.start
     explained = _near_static(whole[0], *at, int(reach))
-    wait = np.where(_near_static(whole[0], *at, 1), beside, settle) if beside < settle else settle
+    wait = np.where(_continues_line(whole[0], *at), in_line, settle) if in_line < settle else settle
     s, d, seen, last_hit, since = (layer[rows, places] for layer in whole)  # views
 
     # S_{t-1} in the cells that were hit
@@ -293,6 +296,15 @@ def _of_state(s: Array, values: Array) -> Array:
     undecided = np.where(s < -DECIDED_LOG_ODDS, values[FREE], values[UNKNOWN])
     picked: Array = np.where(s > DECIDED_LOG_ODDS, values[OCCUPIED], undecided)
     return picked
+
+
+def _continues_line(s: Array, row: IntArray, column: IntArray) -> NDArray[np.bool_]:
+    """Whether the next two cells in one of eight directions are decided static."""
+    static = np.pad(s > DECIDED_LOG_ODDS, 2)
+    found = np.zeros(len(row), dtype=np.bool_)
+    for i, j in EIGHT:
+        found |= static[row + 2 + i, column + 2 + j] & static[row + 2 + 2 * i, column + 2 + 2 * j]
+    return found
 
 
 def _near_static(s: Array, row: IntArray, column: IntArray, reach: int) -> NDArray[np.bool_]:

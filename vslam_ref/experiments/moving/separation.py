@@ -67,14 +67,16 @@ class SeparationConfig:
     )
     map: MapConfig = field(
         default_factory=lambda: MapConfig(
-            sensor=InverseSensor(s_miss=0.2, s_graze=1 / 3),
+            sensor=InverseSensor(s_miss=0.15, s_graze=0.3),
             d_memory="text",
             explained_by=0,
             graze=3,
-            settle_beside=1.0,
+            settle_seconds=5.0,
+            settle_in_line=0.3,
+            s_most=0.9999,
         ),
         metadata={
-            "reason": "true poses: a miss is worth a hit but where beams graze; walls heal in a second"
+            "reason": "true poses: a miss is sure but where beams graze, and a wall heals at the third hit"
         },
     )
     plain: MapConfig = field(
