@@ -131,9 +131,12 @@ def beams(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.
 
 @pytest.mark.parametrize("graze", [0, 1, 3, 50])
 @pytest.mark.parametrize("seed", range(5))
-def test_marks_are_the_crossed_cells_and_hits_win(seed: int, graze: int) -> None:
+def test_marks_are_the_crossed_cells_and_hits_win(
+    seed: int, graze: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Grazed are the cells within ``graze`` of the last crossed one, along the beam's longer axis."""
-    start, ends, hit = beams(np.random.default_rng(seed), 150)  # more than one group
+    monkeypatch.setattr(rays, "GROUP", 7 if seed % 2 else rays.GROUP)  # more than one group
+    start, ends, hit = beams(np.random.default_rng(seed), 150)
     window = np.zeros((40, 40), np.uint8)
     rays.mark_beams(window, start, ends, hit, graze)
     expected = np.zeros((40, 40), np.uint8)

@@ -1,7 +1,7 @@
 """Numba twins of the grids' hot loops: one walk per beam, then one pass over the scan's window.
 
 A beam is walked column by column along its longer axis, as in :mod:`vslam_ref.grids.rays`, with the height
-above the present row kept as an integer: no rounding, no division.
+above the next row kept as an integer: no rounding, no division.
 """
 
 from __future__ import annotations
@@ -28,6 +28,15 @@ def _quanta(x):
 
 
 @njit(cache=True)
+def _step(at, height, along, across, rise, run):
+    """(last cell in this column, first cell in the next, its height); choices only, no branches."""
+    height += rise
+    other = at + (across if height > 0 else 0)
+    onward = at + along + (across if height >= 0 else 0)
+    return other, onward, height - (run if height >= 0 else 0)
+
+
+@njit(cache=True)
 def _walk(flat, columns, x0, y0, x1, y1, grazing):
     """Mark MISS along one beam, given in quanta, and GRAZE in its last ``grazing`` columns."""
     dx, dy = x1 - x0, y1 - y0
@@ -43,32 +52,23 @@ def _walk(flat, columns, x0, y0, x1, y1, grazing):
         du, dv, pu, pv, along, across = abs(dx), abs(dy), px, py, sx, sy * columns
     else:
         du, dv, pu, pv, along, across = abs(dy), abs(dx), py, px, sy * columns, sx
-    run, rise = du * QUANTA, dv * QUANTA
-    height = pv * du - pu * dv  # above the present row, in 1 / run
-    climb = max((pv + dv + QUANTA - 1) // QUANTA, 1) - 1  # rows still to come
+    rise, run = dv * QUANTA, du * QUANTA
+    height = pv * du - pu * dv - run  # above the next row, in 1 / run
     steps = max((pu + du + QUANTA - 1) // QUANTA, 1) - 1
+    climb = max((pv + dv + QUANTA - 1) // QUANTA, 1) - 1
+    last = at + along * steps + across * climb
     body = min(max(steps + 1 - grazing, 0), steps)
     for _ in range(body):
-        flat[at] = MISS
-        height += rise
-        flat[at + (across if height > run else 0)] = MISS  # the next row, too; not by a corner
-        up = height >= run
-        height -= run if up else 0
-        climb -= up
-        at += along + (across if up else 0)
+        flat[np.uint64(at)] = MISS  # unsigned: no test whether the place is counted from the end
+        other, at, height = _step(at, height, along, across, rise, run)
+        flat[np.uint64(other)] = MISS
     for _ in range(body, steps):
         flat[at] = max(flat[at], GRAZE)
-        height += rise
-        other = at + (across if height > run else 0)
+        other, at, height = _step(at, height, along, across, rise, run)
         flat[other] = max(flat[other], GRAZE)
-        up = height >= run
-        height -= run if up else 0
-        climb -= up
-        at += along + (across if up else 0)
-    last = GRAZE if grazing > 0 else MISS
-    flat[at] = max(flat[at], last)
-    if climb > 0:
-        flat[at + across] = max(flat[at + across], last)
+    mark = GRAZE if grazing > 0 else MISS
+    flat[at] = max(flat[at], mark)
+    flat[last] = max(flat[last], mark)
 
 
 @njit(cache=True)

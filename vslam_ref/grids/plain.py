@@ -75,6 +75,8 @@ def apply_plain(
     whole = log_odds.reshape(-1, columns)
     seen = look(whole.shape, start, ends, hit)
     part = whole[seen.rows, seen.columns]
-    part += (seen.window == MISS) * evidence[0]
-    part[seen.hits] += evidence[1]
-    np.clip(part, -bound, bound, out=part)
+    new = (seen.window == MISS).astype(np.float64)  # of its own: work within the map's rows is slower
+    new *= evidence[0]
+    new.reshape(-1)[seen.flat_hits] = evidence[1]
+    new += part
+    np.clip(new, -bound, bound, out=part)

@@ -11,8 +11,9 @@ long as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and
 place of m is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
 
 How it is done without sorting.  Each beam is mirrored to run to the right and upwards, and walked along
-the axis on which it is longer.  In one column it then crosses one cell or two: from the row at which it
-enters to the row at which it leaves.
+the axis on which it is longer.  It crosses its first cell, its last one, and the two cells beside each line
+between columns that it meets: both lie in the row n/d rounded down.  In a corner, where n/d is an integer,
+only the right one does.
 """
 
 from __future__ import annotations
@@ -24,13 +25,14 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 QUANTA = 4096
 """Parts of a cell to which the ends of beams are rounded."""
 MAX_LENGTH = 16384
 """Cells per axis that a beam may span: 16384 * 4096 = 2^26, and products of two such numbers are exact."""
-GROUP = 64
-"""Beams that are walked together."""
+GROUP = 40
+"""Columns of all beams that are walked together: more would leave the processor's cache."""
 UNSEEN, GRAZE, MISS, HIT = 0, 1, 2, 3
 """What a scan says of a cell; the larger one counts.  GRAZE is a miss just before the beam's own end."""
 TOO_LONG = f"a beam is not finite or spans more than {MAX_LENGTH} cells; take a coarser resolution"
@@ -52,7 +54,11 @@ class Walks(NamedTuple):
     last_row: Array
     start: IntArray
     signs: IntArray
-    steep: NDArray[np.bool_]
+    steep: Mask
+
+    def of(self, beams: IntArray | Mask) -> Walks:
+        """Return some of the beams."""
+        return Walks(*(field[beams] for field in self))  # type: ignore[arg-type]
 
 
 def walks(start: ArrayLike, ends: ArrayLike) -> Walks:
@@ -72,10 +78,8 @@ def walks(start: ArrayLike, ends: ArrayLike) -> Walks:
     first = np.floor(signs * p / QUANTA)  # first cell of the mirrored beam
     inside = signs * p - first * QUANTA  # in [0, QUANTA)
     steep = d[:, 1] > d[:, 0]
-    u = np.where(steep, 1, 0)
-    beam = np.arange(len(d))
-    du, dv = d[beam, u], d[beam, 1 - u]
-    pu, pv = inside[beam, u], inside[beam, 1 - u]
+    du, dv = np.where(steep, d.T[::-1], d.T)
+    pu, pv = np.where(steep, inside.T[::-1], inside.T)
     columns = np.maximum(np.ceil((pu + du) / QUANTA), 1.0)
     run = np.maximum(du * QUANTA, 1.0)
     cells = np.where(signs < 0, -1 - first, first).astype(np.int64)
@@ -126,42 +130,35 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
     [[0, 0], [1, -1], [2, -2]]
     """
     w = walks(start, ends)
-    every = np.arange(len(w.columns))
-    rows = _rows_of_columns(w, every)
-    here = np.arange(rows.enter.shape[1]) < w.columns[:, None]
-    beam = np.concatenate([np.nonzero(here)[0], np.nonzero(here & (rows.leave > rows.enter))[0]])
-    column = np.concatenate([np.nonzero(here)[1], np.nonzero(here & (rows.leave > rows.enter))[1]])
-    row = np.concatenate([rows.enter[here], rows.leave[here & (rows.leave > rows.enter)]]).astype(np.int64)
-    order = np.lexsort((row, column, beam))
-    beam, column, row = beam[order], column[order], row[order]
+    every, last = np.arange(len(w.columns)), w.columns - 1
+    line = np.arange(1, int(last.max(initial=0)) + 1)[:, None]
+    row, corner = _rows_at_lines(w.rise, w.offset, w.run, np.minimum(line, last))
+    met = line <= last
+    (k, right), (m, left) = np.nonzero(met), np.nonzero(met & ~corner)
+    beam = np.concatenate([every, every, right, left])
+    column = np.concatenate([0 * every, last, k + 1, m])
+    height = np.concatenate([0 * every, w.last_row, row[k, right], row[m, left]]).astype(np.int64)
+    order = np.lexsort((height, column, beam))
+    beam, column, height = beam[order], column[order], height[order]
+    again = np.zeros(len(beam), dtype=np.bool_)  # a cell to the right of one line and to the left of the next
+    again[1:] = (np.diff(beam) == 0) & (np.diff(column) == 0) & (np.diff(height) == 0)
+    beam, column, height = beam[~again], column[~again], height[~again]
     steep = w.steep[beam]
-    walked = np.stack([np.where(steep, row, column), np.where(steep, column, row)], 1)
+    walked = np.stack([np.where(steep, height, column), np.where(steep, column, height)], 1)
     cells = w.start[beam] + w.signs[beam] * walked
     return Crossings(beam, cells[:, ::-1].copy())
 
 
-class _Rows(NamedTuple):
-    """Columns (G, K) of beams, and the rows at which they enter and leave; the last column is repeated."""
+def _rows_at_lines(rise: Array, offset: Array, run: Array, line: ArrayLike) -> tuple[Array, Mask]:
+    """Rows in which mirrored beams cross lines between columns, and whether they do so in a corner.
 
-    column: Array
-    enter: Array
-    leave: Array
-
-
-def _rows_of_columns(w: Walks, beams: IntArray) -> _Rows:
-    """Rows in which some mirrored beams cross each of their columns."""
-    last = w.columns[beams] - 1
-    k = np.minimum(np.arange(int(last.max(initial=0)) + 2.0), last[:, None])
-    height = w.rise[beams, None] * k
-    height += w.offset[beams, None]
-    height /= w.run[beams, None]  # at the left line of the column
-    enter = np.floor(height[:, :-1])
-    enter[:, :1] = 0.0
-    enter[last == 0] = 0.0  # the first column, repeated
-    leave = np.ceil(height[:, 1:])  # at the right line, seen from below
-    leave -= 1.0
-    leave[np.arange(len(last)), last] = w.last_row[beams]
-    return _Rows(k[:, :-1], enter, np.maximum(leave, enter, out=leave))
+    Both cells beside the line are crossed; in a corner the right one only.
+    """
+    height = rise * np.asarray(line)
+    height += offset
+    height /= run
+    row = np.floor(height)
+    return row, row == height
 
 
 def _cut(w: Walks, columns: IntArray) -> Walks:
@@ -171,19 +168,7 @@ def _cut(w: Walks, columns: IntArray) -> Walks:
     return w._replace(columns=left, last_row=np.where(columns > 0, np.maximum(top, 0.0), w.last_row))
 
 
-def _rows_of_last_columns(w: Walks, beams: IntArray, columns: int) -> _Rows:
-    """:func:`_rows_of_columns` for the last ``columns`` only; of fewer the first is repeated."""
-    last = w.columns[beams, None] - 1
-    k = np.maximum(last - np.arange(columns), 0).astype(np.float64)
-    rise, offset, run = w.rise[beams, None], w.offset[beams, None], w.run[beams, None]
-    enter = np.where(k == 0, 0.0, np.floor((rise * k + offset) / run))
-    leave = np.where(k == last, w.last_row[beams, None], np.ceil((rise * (k + 1) + offset) / run) - 1.0)
-    return _Rows(k, enter, np.maximum(leave, enter))
-
-
-def mark_beams(
-    window: NDArray[np.uint8], start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0
-) -> None:
+def mark_beams(window: NDArray[np.uint8], start: Array, ends: Array, hit: Mask, graze: int = 0) -> None:
     """Mark in ``window`` (rows, columns) what a scan says: MISS where beams cross, HIT at their ends.
 
     Parameters
@@ -209,35 +194,55 @@ def mark_beams(
 
 
 def _marks(
-    rows: int, columns: int, start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0
+    rows: int, columns: int, start: Array, ends: Array, hit: Mask, graze: int = 0
 ) -> NDArray[np.uint8]:
     """What a scan says of a window that nothing was said of before."""
     w = walks(start, ends)
-    strides = np.array([1, columns])
-    steps = (w.signs * strides).astype(np.float64)
-    along = np.where(w.steep, steps[:, 1], steps[:, 0])
-    across = np.where(w.steep, steps[:, 0], steps[:, 1])
-    first = (w.start @ strides).astype(np.float64)
     marks = np.zeros(rows * columns, dtype=np.uint8)
-
-    def write(beams: IntArray, walked: _Rows, mark: int) -> None:
-        column = walked.column * along[beams, None]
-        column += first[beams, None]
-        for row in (walked.enter, walked.leave):
-            row *= across[beams, None]
-            row += column
-            marks[row.astype(np.int64)] = mark
-
     if graze > 0:
-        grazing = np.flatnonzero(hit)
-        write(grazing, _rows_of_last_columns(w, grazing, graze + 1), GRAZE)
+        _write(marks, columns, w.of(hit), GRAZE, graze + 1)
         w = _cut(w, np.where(hit, graze + 1, 0))
-    order = np.argsort(w.columns)  # like lengths together
-    order = order[np.searchsorted(w.columns[order], 1) :]
-    for beams in (order[n : n + GROUP] for n in range(0, len(order), GROUP)):
-        write(beams, _rows_of_columns(w, beams), MISS)
-    marks[end_cells(ends[hit]) @ strides] = HIT
+    _write(marks, columns, w, MISS)
+    marks[end_cells(ends[hit]) @ [1, columns]] = HIT
     return marks.reshape(rows, columns)
+
+
+def _write(marks: NDArray[np.uint8], columns: int, w: Walks, mark: int, last: int = MAX_LENGTH + 1) -> None:
+    """Write ``mark`` to the cells that beams cross in their ``last`` columns.
+
+    The first cell and one in the column before these are written, too: what is right there must come later.
+    """
+    lines = np.minimum(w.columns - 1.0, last)
+    order = np.argsort(-lines)  # long beams first
+    order = order[: np.count_nonzero(w.columns)]
+    w, lines = w.of(order), lines[order]
+    strides = (w.signs * [1, columns]).T
+    along, across = np.where(w.steep, strides[::-1], strides)
+    first = w.start @ [1, columns]
+    skipped = w.columns - 1 - lines
+    marks[first] = mark
+    marks[first + along * (w.columns - 1) + across * w.last_row.astype(np.int64)] = mark
+
+    # all other cells lie beside a line between columns; in floats, as their products are vector code
+    offset, start = w.offset + w.rise * skipped, (first + along * skipped).astype(np.float64)
+    along_of, across_of = along.astype(np.float64), across.astype(np.float64)
+    whole = np.int32 if marks.size < 2**31 else np.int64  # from floats to int32 first: vector code
+    most = int(lines.max(initial=0))
+    for k in range(1, most + 1, GROUP):
+        n = np.count_nonzero(lines >= k)
+        line = np.arange(float(k), min(k + GROUP, most + 1))[:, None]
+        if lines[n - 1] < line[-1]:
+            line = np.minimum(line, lines[:n])  # of a beam that ends before, the last line is repeated
+        row, corner = _rows_at_lines(w.rise[:n], offset[:n], w.run[:n], line)
+        row *= across_of[:n]
+        column = line * along_of[:n]
+        column += start[:n]
+        row += column
+        right = row.astype(whole).astype(np.int64)
+        left = right - along[:n]
+        np.copyto(left, right, where=corner)
+        marks[right] = mark
+        marks[left] = mark
 
 
 def end_cells(ends: Array) -> IntArray:
@@ -254,14 +259,18 @@ class Look(NamedTuple):
     window: NDArray[np.uint8]
 
     @property
+    def flat_hits(self) -> IntArray:
+        """Places of the window's hits, counted row by row."""
+        return np.flatnonzero(self.window.reshape(-1) == HIT)  # in two dimensions ten times slower
+
+    @property
     def hits(self) -> tuple[IntArray, IntArray]:
         """Rows and columns of the window's hits."""
-        found = np.flatnonzero(self.window.reshape(-1) == HIT)  # in two dimensions ten times slower
-        row, column = np.divmod(found, self.window.shape[1])
+        row, column = np.divmod(self.flat_hits, self.window.shape[1])
         return row, column
 
 
-def look(shape: tuple[int, int], start: Array, ends: Array, hit: NDArray[np.bool_], graze: int = 0) -> Look:
+def look(shape: tuple[int, int], start: Array, ends: Array, hit: Mask, graze: int = 0) -> Look:
     """Return what a scan says of a map of ``shape`` (rows, columns), in its bounding window.
 
     Other arguments as for :func:`mark_beams`.
