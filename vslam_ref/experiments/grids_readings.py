@@ -17,7 +17,7 @@ from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContex
 from vslam_ref.experiments.moving.readings import generator, interval_of_means, null_rate
 from vslam_ref.experiments.moving.separation import SeparationConfig, measure, precision_recall
 from vslam_ref.grids.inverse_sensor import Where
-from vslam_ref.grids.static_dynamic import Memory
+from vslam_ref.grids.map_config import Memory
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, simulate
 
 if TYPE_CHECKING:

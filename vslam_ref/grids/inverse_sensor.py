@@ -14,7 +14,7 @@ unknown   graze        half a miss   low                low
 occupied  graze        nothing       low                low
 ========  ===========  ============  =================  ==========================================
 
-To *graze* a cell is to cross it just before the beam's own end (:data:`MapConfig.graze`, 0 for never).  A
+To *graze* a cell is to cross it just before the beam's own end (``graze`` of the map's config, 0 for never).  A
 beam that meets a wall at a small angle runs through the wall's own cells first: such misses say little.
 """
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from vslam_ref._kernels import accelerated
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
+from vslam_ref.grids.map_config import MapConfig
 from vslam_ref.grids.rays import MISS, look
-from vslam_ref.grids.static_dynamic import MapConfig
 
 Array = NDArray[np.float64]
 

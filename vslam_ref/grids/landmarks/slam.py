@@ -31,9 +31,10 @@ from vslam_ref.grids.landmarks.map_corners import MapCornerConfig
 from vslam_ref.grids.landmarks.matching import Match, MatchConfig, match_scan, thin
 from vslam_ref.grids.landmarks.pose_update import pose_measurement, pose_update
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
+from vslam_ref.grids.map_config import MapConfig
 from vslam_ref.grids.plain import PlainMap
 from vslam_ref.grids.scan import ScanLike, sort_beams
-from vslam_ref.grids.static_dynamic import MapConfig, StaticDynamicMap
+from vslam_ref.grids.static_dynamic import StaticDynamicMap
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
