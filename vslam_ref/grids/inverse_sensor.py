@@ -14,8 +14,8 @@ unknown   graze        half a miss   low                low
 occupied  graze        nothing       low                low
 ========  ===========  ============  =================  ==========================================
 
-To *graze* a cell is to cross it just before the beam's own end (``graze`` of the map's config, 0 for never).  A
-beam that meets a wall at a small angle runs through the wall's own cells first: such misses say little.
+To *graze* a cell is to cross it just before the beam's own end (``graze`` of the map's config, 0 for never).
+A beam that meets a wall at a small angle runs through the wall's own cells first: such misses say little.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ Four rules are added, each with a switch:
   than ``hit_gap`` seconds after a hit, has come to stay.  Longer times without a look do not count.  S
   forgets there that the floor was free, and takes it in.  ``None`` is the table as it stands: a chair put
   down on once-free floor is dynamic for ever.  ``settle_in_line`` is a shorter time for cells that continue
-  a line: the next cell and the one behind it, in one of eight directions, are decided static.  What comes to stay
-  there is mostly a wall that beams along it had freed; somebody who leans on a wall continues no line.
+  a line: the next cell and the one behind it, in one of eight directions, are decided static.  What comes to
+  stay there is mostly a wall that beams along it had freed; who leans on a wall continues no line.
 * *grazing*: in the last ``graze`` cells before its own end a beam leaves a weaker word than a miss (see
   :mod:`inverse_sensor`).  0 is the table with two observations.
 

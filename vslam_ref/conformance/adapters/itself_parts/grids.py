@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
-from vslam_ref.grids import inverse_sensor, log_odds, rays, recursion, static_dynamic
+from vslam_ref.grids import inverse_sensor, log_odds, map_config, rays, recursion, static_dynamic
 
 Array = NDArray[np.float64]
 SIDE = 7
@@ -59,8 +59,8 @@ def _config(
     settle_seconds: float | None = None,
     explained_by: int = 0,
     **settings: Any,
-) -> static_dynamic.MapConfig:
-    return static_dynamic.MapConfig(
+) -> map_config.MapConfig:
+    return map_config.MapConfig(
         sensor=inverse_sensor.InverseSensor(**table),
         explained_by=explained_by,
         settle_seconds=settle_seconds,
@@ -70,7 +70,7 @@ def _config(
     )
 
 
-def _look(layers: Array, now: float, observation: str, config: static_dynamic.MapConfig) -> None:
+def _look(layers: Array, now: float, observation: str, config: map_config.MapConfig) -> None:
     steps = config.sensor.steps(config.d_high_where)
     end = [[3.5, 3.5]] if observation == "hit" else [[4.5, 3.5]]
     beam = np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"])
