@@ -90,6 +90,38 @@ def test_a_third_of_the_beams_on_people_does_not_matter(make_grid: Callable[...,
     np.testing.assert_allclose(found.pose[:2], pose[:2], atol=0.01)
 
 
+def test_people_beside_a_wall_pull_only_without_the_cut(make_grid: Callable[..., LogOddsGrid]) -> None:
+    """Half of the points of one wall lie 0.2 m before it, as of people who lean there.
+
+    With a cut at a cell they count for nothing: the pose is right to 1 cm.  Without one the wall's points are
+    0.1 m off in the mean, and least squares move the robot by some of that.
+    """
+    field, segments = room(make_grid)
+    pose = np.array([2.31, 2.47, 0.0])
+    points = points_from(pose, segments)
+    at_wall = np.flatnonzero(points[:, 1] > 1.5)  # the wall y = 4.05
+    points[at_wall[::2], 1] -= 0.2
+    kept = match_scan(field, points, pose, COV)
+    assert abs(kept.pose[1] - pose[1]) < 0.01
+    plain = match_scan(field, points, pose, COV, MatchConfig(cut=np.inf, search_cut=np.inf))
+    assert plain.reason == "converged"
+    assert plain.pose[1] - pose[1] > 0.03
+
+
+def test_a_narrow_search_loses_what_a_wide_one_finds(make_grid: Callable[..., LogOddsGrid]) -> None:
+    """From 0.2 m and 0.1 rad off, between the box's poses: a cut of 2 cm feels no wall there."""
+    field, segments = room(make_grid)
+    pose, rng = np.array([2.31, 2.47, 0.7]), np.random.default_rng(3)
+    points = thin(points_from(pose, segments), 0.1)
+    lost = {0.3: 0, 0.02: 0}
+    for off in rng.uniform(-1, 1, (20, 3)) * [0.2, 0.2, 0.1]:
+        for cut in lost:
+            found = match_scan(field, points, pose + off, COV, MatchConfig(search_cut=cut))
+            lost[cut] += bool(np.abs(found.pose[:2] - pose[:2]).max() > 0.02)
+    assert lost[0.3] == 0
+    assert lost[0.02] >= 3
+
+
 def test_a_corridor_tells_nothing_of_the_way_along_it(make_grid: Callable[..., LogOddsGrid]) -> None:
     """Two long walls: information across and in heading; along, none, and the prediction stays."""
     field, segments = room(make_grid, open_ends=True)

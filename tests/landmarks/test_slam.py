@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from vslam_ref.experiments.moving.localisation import localise
 from vslam_ref.experiments.moving.readings import increment_of, scan_of
 from vslam_ref.filters.vehicle import Increment
-from vslam_ref.grids import MapConfig, Scan
-from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig, LandmarkConfig
+from vslam_ref.grids import LogOddsGrid, MapConfig, Scan
+from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig, LandmarkConfig, MatchConfig, distance_field
+from vslam_ref.grids.landmarks.slam import on_moving
+from vslam_ref.worlds.floor_plan import cast
 
 from .conftest import HallRun
 
@@ -23,6 +27,52 @@ def test_the_robot_knows_where_it_is(hall: HallRun) -> None:
     assert rmse(hall, hall.poses) < 0.02
     blind, _, _ = localise(hall.recording, GridSlamConfig(match=False, landmarks=False))
     assert rmse(hall, blind) > 0.05
+
+
+def test_beams_on_moving_things_are_those_on_free_floor_away_from_walls(
+    make_grid: Callable[..., LogOddsGrid],
+) -> None:
+    """A wall in column 20 (x = 2.05), free floor elsewhere, unknown in column 40."""
+    grid = make_grid([(r, 20) for r in range(64)])
+    grid.log_odds[:, 40] = 0.0
+    field = distance_field(grid)
+    x = np.array([2.05, 2.15, 2.25, 1.85, 3.05, 4.05, 99.0])
+    found = on_moving(np.stack([x, np.full(len(x), 3.05)], 1), grid, field)
+    assert found.tolist() == [False, False, True, True, True, False, False]
+
+
+def test_least_squares_need_moving_beams_left_out() -> None:
+    """Known floor, then people 0.4 m before one wall: without them in the match the pose stays right.
+
+    Left in, half of the wall's beams are 0.4 m from it, and least squares give way by centimetres.  A plain
+    grid knows nothing of motion, and does so with either setting.
+    """
+    angles = np.deg2rad(np.arange(-180.0, 180.0, 1.0))
+    walls = np.array([[0, 0, 5.1, 0], [5.1, 0, 5.1, 4.1], [5.1, 4.1, 0, 4.1], [0, 4.1, 0, 0]])
+    room = cast(np.array([2.31, 2.47]), angles, walls, []).range
+    people = room.copy()
+    ahead = np.flatnonzero(np.abs(angles) < 0.5)[::2]  # the wall x = 5.1: the robot moves ahead only
+    people[ahead] -= 0.4 / np.cos(angles[ahead])
+    still = Increment(np.zeros(1), np.zeros(1), np.diag([0.05, 0.02])[None] ** 2)
+    off = {}
+    for leave_out, separate in ((False, True), (True, True), (False, False), (True, False)):
+        config = GridSlamConfig(
+            landmarks=False,
+            leave_out_moving=leave_out,
+            separate=separate,
+            map=MapConfig(d_memory="text"),
+            matching=MatchConfig(cut=np.inf, search_cut=np.inf),
+        )
+        slam = GridSlam([2.31, 2.47, 0.0], config)
+        for k in range(12):
+            slam.step(still if k else None, Scan(angles, room, 10.0, 0.2 * k))
+        known = slam.pose
+        for k in range(12, 15):
+            slam.step(still, Scan(angles, people, 10.0, 0.2 * k))
+        off[leave_out, separate] = float(np.hypot(*(slam.pose - known)[:2]))
+    assert off[True, True] < 0.005
+    assert off[False, True] > 0.02
+    assert off[True, False] == off[False, False] > 0.02
 
 
 def test_landmarks_alone_beat_the_odometry(hall: HallRun) -> None:

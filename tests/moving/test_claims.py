@@ -176,6 +176,29 @@ def test_beams_are_judged_by_what_they_end_on() -> None:
     np.testing.assert_array_equal(mine, total)
 
 
+def test_the_ideal_scan_lacks_what_moves_and_nothing_else() -> None:
+    recording = simulate(SMALL, np.random.default_rng(2))
+    lost = 0
+    for k in range(0, len(recording), 7):
+        whole, kept = recording.ranges[k], localisation.without_moving(recording, k).ranges
+        for i, owner in enumerate(recording.owner[k].tolist()):
+            moves = owner >= 0 and bool(recording.moving[k, owner])
+            assert np.isnan(kept[i]) if moves else np.array_equal(kept[i], whole[i], equal_nan=True)
+            lost += moves
+    assert lost > 20
+
+
+def test_modes_differ_in_one_thing_each() -> None:
+    base = localisation.LocalisationConfig().slam
+    assert localisation.mode_of(base, "robust", "separated") == base
+    assert localisation.mode_of(base, "robust", "ideal") == base, "only its scans are others"
+    plain = localisation.mode_of(base, "robust", "plain")
+    assert plain == dataclasses.replace(base, separate=False)
+    squares = localisation.mode_of(base, "squares", "separated")
+    assert squares.matching.cut == squares.matching.search_cut == np.inf
+    assert dataclasses.replace(squares, matching=base.matching) == base
+
+
 def test_wrong_poses_make_a_worse_dynamic_map() -> None:
     recording = simulate(SMALL, np.random.default_rng(3))
     config = MapConfig(d_memory="text")
