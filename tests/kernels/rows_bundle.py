@@ -16,7 +16,12 @@ from vslam_ref.geometry.cameras import Radtan
 Rng = np.random.Generator
 
 
-def problem(rng: Rng, B: int, n: int, *, shared: bool, held: bool) -> tuple[BundleProblem, Structure]:
+ALL = ("f", "cx", "k1", "k2", "p1", "p2", "k3")
+
+
+def problem(
+    rng: Rng, B: int, n: int, *, shared: bool, held: bool, intrinsics: tuple[str, ...] = ALL
+) -> tuple[BundleProblem, Structure]:
     """B + 1 views, 2 n points, some behind a camera; a lens of unit focal length."""
     views, points, sets = B + 1, 2 * n, 1 if shared else B + 1
     T = se3.perturb(np.eye(4), 0.2 * rng.standard_normal((views, 6)) + [0, 0, 3.0, 0, 0, 0])
@@ -27,7 +32,7 @@ def problem(rng: Rng, B: int, n: int, *, shared: bool, held: bool) -> tuple[Bund
     view, point = (a.ravel() for a in np.meshgrid(np.arange(views), np.arange(points)))
     keep = rng.random(len(view)) < 0.8
     uv = rng.normal(0, 0.3, (int(keep.sum()), 2))
-    free = freedom(Radtan, scene, intrinsics=("f", "cx", "k1", "k2", "p1", "p2", "k3"))
+    free = freedom(Radtan, scene, intrinsics=intrinsics)
     pose = free.pose.copy()
     if held:
         pose[0], pose[-1, 2] = False, False
@@ -53,8 +58,10 @@ def _moving(given: BundleProblem, table: Structure) -> tuple[Any, ...]:
     return (*state[:3], state.intrinsics, *table.links)
 
 
-def _for_schur(rng: Rng, B: int, n: int, shared: bool, held: bool) -> tuple[Any, ...]:
-    given, table = problem(rng, B, n, shared=shared, held=held)
+def _for_schur(
+    rng: Rng, B: int, n: int, shared: bool, held: bool, intrinsics: tuple[str, ...] = ALL
+) -> tuple[Any, ...]:
+    given, table = problem(rng, B, n, shared=shared, held=held, intrinsics=intrinsics)
     weights = rng.uniform(0.5, 1, len(table.order))
     normal = normal_equations(given.model, table.state(given), table, weights, given.free.intrinsics)
     M = schur.point_factor(normal.C, np.ones((2 * n, 3)), table.free_point)
@@ -64,6 +71,11 @@ def _for_schur(rng: Rng, B: int, n: int, shared: bool, held: bool) -> tuple[Any,
 
 def for_schur(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return _for_schur(rng, B, n, shared=False, held=False)
+
+
+def for_schur_of_nine(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Nine columns a view, a width for which loops are unrolled; six are among the shared ones."""
+    return _for_schur(rng, B, n, shared=False, held=False, intrinsics=("f", "k1", "k2"))
 
 
 def for_schur_shared(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
@@ -86,7 +98,13 @@ def for_point_steps(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "bundle:polynomial_residuals": [for_residuals],
     "bundle:polynomial_normal": [for_normal],
-    "bundle_schur:schur_complement": [for_schur, for_schur_shared, for_schur_held, for_schur_shared_held],
+    "bundle_schur:schur_complement": [
+        for_schur,
+        for_schur_of_nine,
+        for_schur_shared,
+        for_schur_held,
+        for_schur_shared_held,
+    ],
     "bundle_schur:point_steps": [for_point_steps],
 }
 

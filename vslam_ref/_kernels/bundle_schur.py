@@ -44,16 +44,59 @@ def _add_part(parts, at, size, columns, span):
     return parts + 1
 
 
+def _block_of(width):
+    """Make S[row:, column:] -= V Z^T for blocks of a width that the compiler knows, and its lower triangle.
+
+    The loops are unrolled then.  Indices are unsigned: a signed one may be negative, and would be looked at.
+    """
+
+    @njit(cache=True)
+    def subtract(S, row, column, V, s, t):
+        row, column, s, t = np.uint64(row), np.uint64(column), np.uint64(s), np.uint64(t)
+        for i in range(width):
+            a = np.uint64(i)
+            v0, v1, v2 = V[s, a, 0], V[s, a, 1], V[s, a, 2]
+            for j in range(width):
+                b = np.uint64(j)
+                S[row + a, column + b] -= v0 * V[t, b, 0] + v1 * V[t, b, 1] + v2 * V[t, b, 2]
+
+    @njit(cache=True)
+    def subtract_own(S, row, V, s):
+        row, s = np.uint64(row), np.uint64(s)
+        for i in range(width):
+            a = np.uint64(i)
+            v0, v1, v2 = V[s, a, 0], V[s, a, 1], V[s, a, 2]
+            for j in range(i + 1):
+                b = np.uint64(j)
+                S[row + a, row + b] -= v0 * V[s, b, 0] + v1 * V[s, b, 1] + v2 * V[s, b, 2]
+
+    return subtract, subtract_own
+
+
+_subtract_6, _subtract_own_6 = _block_of(6)  # poses
+_subtract_9, _subtract_own_9 = _block_of(9)  # poses with a lens of their own, as BAL has them
+
+
 @njit(cache=True)
 def _subtract_pairs(S, parts, V, columns, span):
     """S -= V V^T, lower triangle, for all pairs of parts."""
     for s in range(parts):
-        w = span[s, 2]
+        first, last, w = span[s, 0], span[s, 1], span[s, 2]
+        known = w if span[s, 3] and (w == 6 or w == 9) else 0
         for t in range(parts):
-            if span[t, 0] > span[s, 1]:  # the whole block lies above the diagonal
+            if span[t, 0] > last:  # the whole block lies above the diagonal
                 continue
-            if span[s, 3] and span[t, 3] and span[t, 1] < span[s, 0]:
-                _subtract_block(S, span[s, 0], span[t, 0], V[s, :w], V[t, : span[t, 2]])
+            below = span[s, 3] and span[t, 3] and span[t, 1] < first
+            if below and known == 6 and span[t, 2] == 6:
+                _subtract_6(S, first, span[t, 0], V, s, t)
+            elif below and known == 9 and span[t, 2] == 9:
+                _subtract_9(S, first, span[t, 0], V, s, t)
+            elif below:
+                _subtract_block(S, first, span[t, 0], V[s, :w], V[t, : span[t, 2]])
+            elif s == t and known == 6:
+                _subtract_own_6(S, first, V, s)
+            elif s == t and known == 9:
+                _subtract_own_9(S, first, V, s)
             else:
                 _subtract_entries(S, columns[s, :w], columns[t, : span[t, 2]], V[s], V[t])
 
@@ -124,6 +167,7 @@ def schur_complement(
         np.empty((2 * longest, d), np.int64),
         np.empty((2 * longest, 4), np.int64),
     )
+    W, columns = np.ascontiguousarray(W), np.ascontiguousarray(columns)  # no copies, mostly; quicker to index
     run = 0
     for j in range(len(offsets) - 1):
         begin, end = offsets[j], offsets[j + 1]

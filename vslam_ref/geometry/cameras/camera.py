@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+import math
+from dataclasses import dataclass, fields
 from typing import ClassVar, Self
 
 import numpy as np
@@ -47,8 +48,9 @@ class Camera:
     def __post_init__(self) -> None:
         if not hasattr(self, "lens"):
             raise TypeError("Camera has no lens; make a Pinhole, Fov, Radtan, Rational or Fisheye")
-        for name, value in zip(self.names(), astuple(self), strict=True):
-            if not np.isfinite(value):
+        for name in self.names():
+            value = getattr(self, name)
+            if not math.isfinite(value):
                 raise ValueError(f"{name}={value}: must be finite")
         if not (self.fx > 0 and self.fy > 0):
             raise ValueError(f"fx={self.fx}, fy={self.fy}: focal lengths must be more than 0")
@@ -61,7 +63,7 @@ class Camera:
     @property
     def params(self) -> Array:
         """All intrinsics, shape (n,)."""
-        return np.array(astuple(self), dtype=np.float64)
+        return np.array([getattr(self, name) for name in self.names()], dtype=np.float64)
 
     @classmethod
     def from_params(cls, params: ArrayLike) -> Self:
