@@ -78,7 +78,7 @@ def localised(
 
 def test_the_claims_on_localisation() -> None:
     halves = ("halves-the-error", "halves-the-error-of-least-squares")
-    bounds = ("no-separation-halves-it", "a-cut-does-more")
+    bounds = ("no-mistakes-would-not-halve-it", "a-cut-does-more")
     names = (*halves, *bounds, "helps", "static-error-spoils-dynamic", "moving-things-spoil-static")
     true = verdicts(grids_localisation, localised(0.4, 4.0, 0.2))
     assert true == dict.fromkeys(names, "reproduced")

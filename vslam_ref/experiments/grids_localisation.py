@@ -114,14 +114,14 @@ def _half(study: Study, rmse: Array, id: str, how: str, draw: int) -> Claim:
 
 
 def _out_of_reach(study: Study) -> Claim:
-    """The aim's bound: what the best of all separations would give."""
+    """What stands against the aim: a separation without mistakes would miss it, too."""
     _, plain, ideal = study.rmse[-1].T
     rng = np.random.default_rng([study.config.seed, 6])
     interval = interval_of_ratio(ideal, plain, rng)
     return Claim(
-        "no-separation-halves-it",
+        "no-mistakes-would-not-halve-it",
         "ours",
-        "Not even perfect knowledge of what moves would halve the position error in the densest crowd",
+        "A separation without mistakes would not halve the position error in the densest crowd, either",
         f"RMSE with the truth's beams / with a plain grid: 95 % whole-run interval > {HALF:g}",
         {
             "ratio": float(ideal.mean() / plain.mean()),

@@ -1,7 +1,7 @@
 """Pose and maps together: separated, in a plain grid, and with perfect knowledge of what moves; one run.
 
 *Separated* means: the robot localises in S, and beams that end on what D takes for moving are left out.
-*Plain* is one occupancy grid and all beams.  *Ideal* is what no separation can surpass: the truth says which
+*Plain* is one occupancy grid and all beams.  *Ideal* is a separation without mistakes: the truth says which
 beams end on something that moves, and these are left out of the map and of the matching alike.
 
 Each is run with the matcher as it is, and, where asked for, with least squares: nothing is too far to count.
