@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import functools
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,6 +11,7 @@ import plain_filters as ekf
 import plain_grids as grids
 import plain_lift as lifted
 import pytest
+from vector_cases import listed, loaded, mistakes, size, some
 
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.adapters.table import plain
@@ -73,21 +73,7 @@ FILES = [
 
 LONG = ("15/ekf.json", "16/carleman.json", "16/reduced.json")
 """These take seconds to make."""
-
-
-@functools.cache
-def loaded(name: str) -> form.VectorFile:
-    return form.load(name)
-
-
-def listed(case: form.Case) -> list[str]:
-    """Mistakes that a case can name."""
-    return [*case.mistakes, *(case.statistic or {}).get("mistakes", {})]
-
-
-MISTAKES = sorted(
-    {(name, case.function, note) for name in FILES for case in loaded(name).cases for note in listed(case)}
-)
+MISTAKES = mistakes(FILES)
 
 
 def program(**more: Any) -> InProcess:
@@ -99,11 +85,6 @@ def program(**more: Any) -> InProcess:
 
     module.answer = answer  # type: ignore[attr-defined]
     return InProcess(module)
-
-
-def some(name: str, keep: Any) -> form.VectorFile:
-    file = loaded(name)
-    return file._replace(cases=[case for case in file.cases if keep(case)])
 
 
 def failures(report: Report) -> list[str]:
@@ -161,14 +142,10 @@ def flipped(value: Any) -> Any:
     if isinstance(value, list):
         if value and isinstance(value[0], dict):
             return [*value[:-1], flipped(value[-1])]
-        sizes = [_size(v) for v in value]
+        sizes = [size(v) for v in value]
         at = sizes.index(max(sizes)) if sizes else 0
         return [flipped(v) if k == at else v for k, v in enumerate(value)]
     return -value if isinstance(value, int | float) else value
-
-
-def _size(value: Any) -> float:
-    return max(map(_size, value), default=0.0) if isinstance(value, list) else abs(value)
 
 
 @pytest.mark.parametrize("name", FILES)

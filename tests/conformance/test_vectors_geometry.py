@@ -13,6 +13,7 @@ import plain_estimates
 import plain_motions
 import plain_views
 import pytest
+from vector_cases import listed, loaded, mistakes, size, some
 
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.adapters.table import answer_from, plain
@@ -27,21 +28,7 @@ PROGRAM: dict[str, Callable[..., Any]] = {
     **plain_views.PROGRAM,
 }
 FILES = [name for name in form.names() if name[:2] in ("01", "02", "03", "04", "05", "06", "23")]
-
-
-@functools.cache
-def loaded(name: str) -> form.VectorFile:
-    return form.load(name)
-
-
-def listed(case: form.Case) -> list[str]:
-    """Mistakes that a case can name."""
-    return [*case.mistakes, *(case.statistic or {}).get("mistakes", {})]
-
-
-MISTAKES = sorted(
-    {(name, case.function, note) for name in FILES for case in loaded(name).cases for note in listed(case)}
-)
+MISTAKES = mistakes(FILES)
 
 
 def program(wrong: str | None = None) -> InProcess:
@@ -50,11 +37,6 @@ def program(wrong: str | None = None) -> InProcess:
     table = {name: functools.partial(function, wrong=wrong) for name, function in PROGRAM.items()}
     module.answer = lambda function, inputs: answer_from(table, function, inputs)  # type: ignore[attr-defined]
     return InProcess(module)
-
-
-def some(name: str, keep: Callable[[form.Case], bool]) -> form.VectorFile:
-    file = loaded(name)
-    return file._replace(cases=[case for case in file.cases if keep(case)])
 
 
 def failures(report: Report) -> list[str]:
@@ -111,7 +93,7 @@ def flipped(value: Any) -> Any:
     if isinstance(value, list):
         if value and isinstance(value[0], dict):
             return [*value[:-1], flipped(value[-1])]
-        sizes = [_size(v) for v in value]
+        sizes = [size(v) for v in value]
         at = sizes.index(max(sizes)) if sizes else 0
         return [flipped(v) if k == at else v for k, v in enumerate(value)]
     if isinstance(value, str):
@@ -119,10 +101,6 @@ def flipped(value: Any) -> Any:
         last = str(-float(words[-1]))
         return value.rstrip()[: -len(words[-1])] + last + "\n"
     return value if isinstance(value, bool) else -value
-
-
-def _size(value: Any) -> float:
-    return max(map(_size, value), default=0.0) if isinstance(value, list) else abs(value)
 
 
 @pytest.mark.parametrize("name", FILES)

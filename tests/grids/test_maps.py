@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from vslam_ref import _kernels
-from vslam_ref.grids import AS_PRINTED, MapConfig, PlainMap, Scan, StaticDynamicMap, rays
+from vslam_ref.grids import AS_PRINTED, MapConfig, PlainMap, Scan, StaticDynamicMap, rays, static_dynamic
 from vslam_ref.grids.log_odds import FREE, OCCUPIED, UNKNOWN, states
 from vslam_ref.grids.scan import BeamCounts, LaserScanner
 
@@ -476,3 +476,12 @@ def test_a_wall_that_was_freed_comes_back_in_its_line_and_a_person_at_the_wall_d
     for k in range(8):
         grid.update([0.05, 0.05, 0.0], Scan(angles, stands, 50.0, 3.0 + 0.2 * k))
     assert grid.static().at(person)[0] < -2.2
+
+
+def test_no_line_goes_on_beyond_the_maps_border() -> None:
+    """The cell behind the next one is outside: neither the map's other side nor its corner stands for it."""
+    s = np.zeros((6, 8))
+    s[0, 5] = s[-1, 5] = s[0, 0] = 5.0
+    assert not static_dynamic._continues_line(s, np.array([1]), np.array([5]))[0]
+    s[2, 5] = s[3, 5] = 5.0
+    assert static_dynamic._continues_line(s, np.array([1]), np.array([5]))[0]

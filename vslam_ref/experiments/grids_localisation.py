@@ -87,7 +87,7 @@ def claims(result: Result) -> list[Claim]:
     return [
         _half(study, study.rmse[-1], "halves-the-error", "", 1),
         _half(study, study.squares, "halves-the-error-of-least-squares", ", with least squares", 5),
-        _out_of_reach(study),
+        _without_mistakes(study),
         _cut_does_more(study),
         _helps(study),
         _spoils_dynamic(study),
@@ -113,7 +113,7 @@ def _half(study: Study, rmse: Array, id: str, how: str, draw: int) -> Claim:
     )
 
 
-def _out_of_reach(study: Study) -> Claim:
+def _without_mistakes(study: Study) -> Claim:
     """What stands against the aim: a separation without mistakes would miss it, too."""
     _, plain, ideal = study.rmse[-1].T
     rng = np.random.default_rng([study.config.seed, 6])

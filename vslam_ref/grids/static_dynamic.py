@@ -42,7 +42,7 @@ from vslam_ref.grids.map_config import MapConfig
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-EIGHT = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+EIGHT = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
 """Directions to the neighbours of a cell."""
 
 
@@ -223,12 +223,18 @@ def _of_state(s: Array, values: Array) -> Array:
 
 
 def _continues_line(s: Array, row: IntArray, column: IntArray) -> NDArray[np.bool_]:
-    """Whether the next two cells in one of eight directions are decided static."""
-    static = np.pad(s > DECIDED_LOG_ODDS, 2)
-    found = np.zeros(len(row), dtype=np.bool_)
-    for i, j in EIGHT:
-        found |= static[row + 2 + i, column + 2 + j] & static[row + 2 + 2 * i, column + 2 + 2 * j]
-    return found
+    """Whether the next two cells in one of eight directions are decided static.
+
+    Beams keep a cell off the map's border: the next cell is there, the one behind it need not be.
+    """
+    i, j = EIGHT.T
+    behind_row, behind_column = row[:, None] + 2 * i, column[:, None] + 2 * j
+    there = (behind_row >= 0) & (behind_row < s.shape[0])
+    there &= (behind_column >= 0) & (behind_column < s.shape[1])
+    next_one = s[row[:, None] + i, column[:, None] + j]
+    behind = s[np.where(there, behind_row, 0), np.where(there, behind_column, 0)]
+    line = there & (next_one > DECIDED_LOG_ODDS) & (behind > DECIDED_LOG_ODDS)
+    return np.asarray(line.any(axis=1))
 
 
 def _near_static(s: Array, row: IntArray, column: IntArray, reach: int) -> NDArray[np.bool_]:

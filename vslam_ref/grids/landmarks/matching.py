@@ -46,7 +46,8 @@ class MatchConfig:
         metadata={"reason": "a cell: what is farther off is something else; inf: nothing is", "unit": "m"},
     )
     search_cut: float = field(
-        default=0.3, metadata={"reason": "three cells: twice the box's steps, at a lever of 5 m", "unit": "m"}
+        default=0.3,
+        metadata={"reason": "a step of the box: 7 cm, and 17 cm more at 5 m", "unit": "m"},
     )
     window: float = field(
         default=0.2, metadata={"reason": "twice the worst step of the odometry", "unit": "m"}
