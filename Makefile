@@ -5,6 +5,7 @@ OUT     ?= out
 WORKERS ?= 2
 PYTEST_ARGS ?=
 FUZZ_ARGS ?=
+MUTANTS_ARGS ?=
 
 BIN    := $(VENV)/bin
 PY     := $(BIN)/python
@@ -16,12 +17,14 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow fuzz lint format notebooks notebooks-check docs docs-index bench grade clean
+.PHONY: help venv reproduce test test-slow fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
 	@echo "make test        run the tests (make test-slow: the long ones)"
 	@echo "make fuzz        damage 10,000 files of every reader and see what it says"
+	@echo "make vectors     make the conformance vectors anew (make vectors-check: compare)"
+	@echo "make mutants     count the mistakes in formulas that the vectors notice"
 	@echo "make lint        style, types, import contracts (make format: repair the style)"
 	@echo "make notebooks   generate and execute notebooks/ from docs/chapters/"
 	@echo "make docs        build the book into $(BUILD)/html"
@@ -56,6 +59,15 @@ test-slow: $(call DONE,fast) $(call DONE,test)
 
 fuzz: $(call DONE,fast) $(call DONE,test)
 	$(ONE_THREAD) $(PY) tests/datasets/fuzz_readers.py $(FUZZ_ARGS)
+
+vectors: $(call DONE,fast) $(call DONE,test)
+	$(PY) tests/conformance/generate.py
+
+vectors-check: $(call DONE,fast) $(call DONE,test)
+	$(PY) tests/conformance/generate.py --check
+
+mutants: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/conformance/mutants.py $(MUTANTS_ARGS)
 
 bench: $(call DONE,fast) $(call DONE,test)
 	@mkdir -p $(OUT)

@@ -36,9 +36,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 BLOCKS = {"SE2": {"rho": 2, "phi": 1}, "SE3": {"rho": 3, "phi": 3}, "Sim3": {"rho": 3, "phi": 3, "sigma": 1}}
 """Length of each block of a tangent vector, in our order."""

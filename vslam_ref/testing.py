@@ -19,11 +19,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.metrics.consistency.bands import mean_band
 
-Array = NDArray[np.float64]
 Difference = Callable[[Array, Array], Array]
 Derivative = tuple[Array, Array, str]  # numeric Jacobian, tolerance of each entry, method
 

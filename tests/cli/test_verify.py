@@ -102,16 +102,6 @@ def test_vectors_are_listed_and_checked(capsys: pytest.CaptureFixture[str]) -> N
     assert "0 remarks" in capsys.readouterr().out
 
 
-def test_one_topic_is_generated(tmp_path: Path) -> None:
-    pytest.importorskip("mpmath", reason="the generator needs mpmath (extra `test`)")
-    assert main(["vectors", "generate", "--topic", "so2", "--out", str(tmp_path)]) == 0
-    written = tmp_path / "02" / "so2.json"
-    assert main(["vectors", "generate", "--topic", "so2", "--out", str(tmp_path), "--check"]) == 0
-    written.write_text(written.read_text() + " ")
-    assert main(["vectors", "generate", "--topic", "so2", "--out", str(tmp_path), "--check"]) == 1
-    assert main(["vectors", "generate", "--topic", "so4", "--out", str(tmp_path)]) == 2
-
-
 def test_there_are_enough_cases() -> None:
     """At least 1500, at most 20 of a regime counted."""
     from vslam_ref.conformance.vectors_format import counted, load, names

@@ -28,15 +28,15 @@ from vslam_ref.conformance.vectors_format import VectorFile
 
 LISTS: dict[str, Any] = json.loads((Path(__file__).parent / "adapter_deviations.json").read_text("utf-8"))
 NAMES = [name for name in LISTS if name != "about"]
-PACKAGE = "vslam_ref.conformance.adapters"
-FOLDER = Path(importlib.util.find_spec(PACKAGE).origin).parent  # type: ignore[union-attr, arg-type]
+HERE = Path(__file__).parent / "adapters"
+SHIPPED = Path(str(importlib.util.find_spec("vslam_ref.conformance.adapters").origin)).parent  # type: ignore[union-attr]
 WORK = tempfile.TemporaryDirectory(prefix="adapter-")
 COMPILERS = ("g++", "clang++")
 CONVENTIONS = {
-    "scipy": "scipy_convention.json",
-    "gtsam": "gtsam_convention.json",
-    "gtsam_usual": "gtsam_convention.json",
-    "node": "node/convention.json",
+    "scipy": HERE / "scipy_convention.json",
+    "gtsam": HERE / "gtsam_convention.json",
+    "gtsam_usual": HERE / "gtsam_convention.json",
+    "node": SHIPPED / "node" / "convention.json",
 }
 
 
@@ -98,18 +98,23 @@ def compiled(source: str) -> str:
     return str(folder / "adapter")
 
 
+def module_file(name: str) -> Path:
+    """File of an adapter in Python."""
+    return HERE / f"{name if name.endswith('_usual') else f'{name}_adapter'}.py"
+
+
 def asked(name: str) -> Asked:
     """The adapter, ready to answer."""
     if name == "cpp":
-        return Program(compiled((FOLDER / "cpp" / "adapter.cpp").read_text("utf-8")), 60.0)
+        return Program(compiled((SHIPPED / "cpp" / "adapter.cpp").read_text("utf-8")), 60.0)
     if name == "node":
-        return Program(f"node '{FOLDER / 'node' / 'adapter.mjs'}'", 60.0)
-    return InProcess(f"{PACKAGE}.{name if name.endswith('_usual') else f'{name}_adapter'}")
+        return Program(f"node '{SHIPPED / 'node' / 'adapter.mjs'}'", 60.0)
+    return InProcess(str(module_file(name)))
 
 
 def convention(name: str) -> Convention:
     """What the adapter declares."""
-    return read(FOLDER / CONVENTIONS[name]) if name in CONVENTIONS else Convention()
+    return read(CONVENTIONS[name]) if name in CONVENTIONS else Convention()
 
 
 def chosen(every: int = 1, topics: set[str] | None = None) -> list[VectorFile]:

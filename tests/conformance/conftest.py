@@ -1,10 +1,9 @@
-"""Lets tests import the plain programs beside them."""
+"""Lets tests import what stands beside them: plain programs, generator, mutation study, adapters."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-HERE = str(Path(__file__).parent)
-if HERE not in sys.path:
-    sys.path.insert(0, HERE)
+HERE = Path(__file__).parent
+sys.path[:0] = [folder for folder in (str(HERE), str(HERE / "adapters")) if folder not in sys.path]

@@ -54,7 +54,7 @@ def test_the_pages_cpp_runs(tmp_path: Path) -> None:
     """Sections 1 to 3 and main of the adapter, with the page's function and table between."""
     lists.need("cpp")
     (code,) = blocks("cpp")
-    whole = (lists.FOLDER / "cpp" / "adapter.cpp").read_text("utf-8")
+    whole = (lists.SHIPPED / "cpp" / "adapter.cpp").read_text("utf-8")
     kept = re.split(r"^// -+ \d .*$", whole, flags=re.MULTILINE)
     text = "".join(kept[:4]) + code + whole[whole.index("Json answer(const Json& request)") :]
     passes(Program(lists.compiled(text), 60.0), {"so3.exp"})

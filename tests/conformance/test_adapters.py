@@ -15,7 +15,7 @@ import pytest
 from vslam_ref.conformance import serve, vectors_format
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.conventions import Convention, read
-from vslam_ref.conformance.program import InProcess, Program
+from vslam_ref.conformance.program import InProcess, Program, load_module
 from vslam_ref.conformance.runner import Report, run
 
 AT_LEAST_EIGHT = ("opencv", "scipy", "gtsam", "cpp", "node")
@@ -115,7 +115,11 @@ def test_an_undeclared_order_is_diagnosed() -> None:
     assert any("rotation" in cause for cause in causes)
 
 
-@pytest.mark.parametrize("path", sorted(lists.FOLDER.rglob("*convention.json")), ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "path",
+    sorted([*lists.SHIPPED.rglob("*convention.json"), *lists.HERE.glob("*convention.json")]),
+    ids=lambda p: p.name,
+)
 def test_convention_files_can_be_read(path: Path) -> None:
     assert read(path) != Convention()
 
@@ -138,7 +142,7 @@ WRONG_SCRIPTS = [
 @pytest.mark.parametrize(("right", "wrong", "function"), WRONG_SCRIPTS)
 def test_one_wrong_sign_in_the_script_is_found(right: str, wrong: str, function: str, tmp_path: Path) -> None:
     lists.need("node")
-    source = (lists.FOLDER / "node" / "adapter.mjs").read_text("utf-8")
+    source = (lists.SHIPPED / "node" / "adapter.mjs").read_text("utf-8")
     assert right in source, right
     (tmp_path / "wrong.mjs").write_text(source.replace(right, wrong), encoding="utf-8")
     program = Program(f"node '{tmp_path / 'wrong.mjs'}'", 60.0)
@@ -172,7 +176,7 @@ STRANGE = [
 @pytest.mark.parametrize("name", ["cpp", "node", "serve"])
 def test_programs_survive_strange_lines(name: str) -> None:
     """One reply to each line but blank ones, in order, with its id."""
-    command = [sys.executable, "-m", "vslam_ref.conformance.serve", f"{lists.PACKAGE}.scipy_adapter"]
+    command = [sys.executable, "-m", "vslam_ref.conformance.serve", str(lists.module_file("scipy"))]
     if name != "serve":
         lists.need(name)
         asked = lists.asked(name)
@@ -195,7 +199,7 @@ def test_programs_survive_strange_lines(name: str) -> None:
 
 
 def test_served_answers_are_those_of_the_module(capsys: pytest.CaptureFixture[str]) -> None:
-    name = f"{lists.PACKAGE}.opencv_adapter"
+    name = str(lists.module_file("opencv"))
     cases = lists.chosen(9, {"so3"})[0].cases
     lines = [json.dumps({"id": c.id, "function": c.function, "inputs": c.inputs}) for c in cases]
     out = io.StringIO()
@@ -246,19 +250,14 @@ def test_numbers_keep_their_digits() -> None:
 
 def test_every_function_of_an_adapter_is_in_the_catalogue() -> None:
     """A misspelt name would be silently unsupported."""
-    from vslam_ref.conformance.adapters import (
-        evo_adapter,
-        filterpy_adapter,
-        gtsam_adapter,
-        opencv_adapter,
-        opencv_usual,
-        scipy_adapter,
-    )
-
-    modules = (evo_adapter, filterpy_adapter, opencv_adapter, opencv_usual, scipy_adapter)
-    names = {name for module in modules for name in module.TABLE} | set(gtsam_adapter.table())
+    modules = [
+        load_module(str(lists.module_file(name)))
+        for name in ("evo", "filterpy", "opencv", "opencv_usual", "scipy")
+    ]
+    names = {name for module in modules for name in module.TABLE}
+    names |= set(load_module(str(lists.module_file("gtsam"))).table())
     for path in ("cpp/adapter.cpp", "node/adapter.mjs"):
-        text = (lists.FOLDER / path).read_text("utf-8")
+        text = (lists.SHIPPED / path).read_text("utf-8")
         table = text[text.index("TABLE = {") :]
         found = {line.split('"')[1] for line in table.splitlines() if line.lstrip(" {").startswith('"')}
         names |= {name for name in found if "." in name}

@@ -7,10 +7,10 @@ import re
 
 import numpy as np
 import pytest
+from generator.writing import SEED
 from scipy.stats import chi2
 
 from vslam_ref.conformance import vectors_format as form
-from vslam_ref.conformance.generator.writing import SEED
 
 QUICK = ("so2", "scale", "noise", "format")
 LONG = (
@@ -21,7 +21,7 @@ LONG = (
 
 def committed(topic: str) -> tuple[str, str]:
     """Text of a topic's file, and of what the generator makes now."""
-    module = importlib.import_module(f"vslam_ref.conformance.generator.{topic}")
+    module = importlib.import_module(f"generator.{topic}")
     name = f"{module.CHAPTER:02d}/{module.TOPIC}.json"
     made = module.build(np.random.default_rng([SEED, module.CHAPTER, *module.TOPIC.encode()])).text()
     return (form.folder() / name).read_text(encoding="utf-8"), made

@@ -6,10 +6,10 @@ import ast
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
-
-from vslam_ref.conformance.mutation.sites import mutants, mutated
+from mutation.sites import mutants, mutated
 
 SOURCE = '''
 import numpy as np
@@ -69,7 +69,7 @@ def test_words_say_what_is_done() -> None:
 
 
 STUDY = """
-from vslam_ref.conformance.mutation import child, study
+from mutation import child, study
 study._names = lambda: ["02/so3.json"]
 found = study.study(4, 0, 2)
 those = [name for name in found.functions if name.startswith("vslam_ref.geometry.so3")]
@@ -80,15 +80,23 @@ print(found.killed, len(found.sample), len(those))
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="mutants need os.fork")
 def test_the_vectors_notice_mutants_of_rotations() -> None:
     """In an interpreter of its own, which has not imported what is changed."""
-    done = subprocess.run([sys.executable, "-c", STUDY], capture_output=True, text=True, check=True)
+    here = str(Path(__file__).parent)
+    path = os.pathsep.join(filter(None, [here, os.environ.get("PYTHONPATH", "")]))
+    done = subprocess.run(
+        [sys.executable, "-c", STUDY],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
     assert done.stdout.split() == ["4", "4", "4"]
 
 
 def test_every_equivalent_mutant_exists() -> None:
     """A reason for a line that was rewritten would hide a mutant that nobody thought about."""
-    from vslam_ref.conformance.mutation.child import source_of
-    from vslam_ref.conformance.mutation.equivalent import EQUIVALENT
-    from vslam_ref.conformance.mutation.study import modules
+    from mutation.child import source_of
+    from mutation.equivalent import EQUIVALENT
+    from mutation.study import modules
 
     known = set()
     for module in modules():

@@ -11,12 +11,12 @@ import plain_filters as ekf
 import plain_grids as grids
 import plain_lift as lifted
 import pytest
+from generator.writing import generate
 from vector_cases import listed, loaded, mistakes, size, some
 
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.adapters.table import plain
 from vslam_ref.conformance.compare import matches
-from vslam_ref.conformance.generator.writing import generate
 from vslam_ref.conformance.program import InProcess
 from vslam_ref.conformance.runner import Report, run
 

@@ -14,7 +14,7 @@ from toy_experiment import TOY, ToyConfig, run, worker_threads
 
 from vslam_ref import _kernels
 from vslam_ref.experiments.framework import InputError, RunContext, run_batches, scheduler
-from vslam_ref.experiments.framework.results import to_json
+from vslam_ref.support.json_text import to_json
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from toy_experiment import Box, ToyConfig
 
 from vslam_ref.experiments.framework import InputError, apply_overrides, assumptions, config_to_dict
-from vslam_ref.experiments.framework.config import format_value, parse_value, settings, without_reason
+from vslam_ref.support.config import format_value, parse_value, settings, without_reason
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vslam_ref.experiments.framework import provenance
+from vslam_ref.support import provenance
 
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 

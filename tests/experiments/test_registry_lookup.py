@@ -10,8 +10,8 @@ import pytest
 from toy_experiment import TOY
 
 from vslam_ref.experiments.framework import InputError, load, register, registry, summaries
-from vslam_ref.experiments.framework.config import config_to_dict, find_setting, format_value, without_reason
-from vslam_ref.experiments.framework.results import to_json
+from vslam_ref.support.config import config_to_dict, find_setting, format_value, without_reason
+from vslam_ref.support.json_text import to_json
 
 IDS = [summary.id for summary in summaries()]
 

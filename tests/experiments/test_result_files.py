@@ -16,10 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_experiment import TOY, figure
 
-from vslam_ref.experiments.framework import Claim, InputError, RunContext, files
+from vslam_ref.experiments.framework import Claim, InputError, RunContext
 from vslam_ref.experiments.framework.reproduce import reproduce
-from vslam_ref.experiments.framework.results import plain, to_json
 from vslam_ref.experiments.framework.writer import FILES, write_npz
+from vslam_ref.support import files
+from vslam_ref.support.json_text import plain, to_json
 
 scalars = (
     st.none() | st.booleans() | st.integers() | st.text() | st.floats(allow_nan=False, allow_infinity=False)

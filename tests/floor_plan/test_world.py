@@ -248,7 +248,7 @@ def test_worlds_that_cannot_be_are_refused(make: object, words: str) -> None:
 
 
 def test_every_number_has_a_reason() -> None:
-    from vslam_ref.experiments.framework.config import without_reason
+    from vslam_ref.support.config import without_reason
 
     assert without_reason(FloorPlanConfig()) == []
 

@@ -8,7 +8,7 @@ import pytest
 from vslam_ref.experiments import grids_moved_chair as chair
 from vslam_ref.experiments import grids_readings as readings
 from vslam_ref.experiments.framework import InputError, Result, RunContext, load
-from vslam_ref.experiments.framework.config import without_reason
+from vslam_ref.support.config import without_reason
 
 
 def judge(module: object, study: object) -> dict[str, str]:

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.framework.results import to_json
 from vslam_ref.experiments.iekf import (
     SENTENCES,
     all_at_once,
@@ -17,6 +16,7 @@ from vslam_ref.experiments.iekf import (
     rules_table,
 )
 from vslam_ref.experiments.iekf.rules import Rule, average, difference_factor, ratio
+from vslam_ref.support.json_text import to_json
 
 
 @pytest.fixture(scope="module")

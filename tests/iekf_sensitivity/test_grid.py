@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import config_to_dict, load
-from vslam_ref.experiments.framework.config import without_reason
 from vslam_ref.experiments.iekf import study
 from vslam_ref.experiments.iekf.grid import (
     BASELINE,
@@ -20,6 +19,7 @@ from vslam_ref.experiments.iekf.grid import (
     quick_grid,
     settings_of,
 )
+from vslam_ref.support.config import without_reason
 
 CONFIG = SensitivityConfig()
 SETTINGS = settings_of(CONFIG)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import RunContext, load
-from vslam_ref.experiments.framework.results import to_json
 from vslam_ref.experiments.iekf.neighbours import (
     FILTERS,
     QUESTIONS,
@@ -18,6 +17,7 @@ from vslam_ref.experiments.iekf.neighbours import (
     rmse,
 )
 from vslam_ref.experiments.iekf_circle import PUBLISHED, published_claim
+from vslam_ref.support.json_text import to_json
 
 TRUE = {
     "ekf/zero": 2.5, "ekf-anchored/zero": 2.5, "iekf/zero": 1.5,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import RunContext, load, summaries
-from vslam_ref.experiments.framework.config import without_reason
-from vslam_ref.experiments.framework.results import to_json
 from vslam_ref.experiments.iekf import study
 from vslam_ref.experiments.iekf.figures import FIGURE_2, figure_result
 from vslam_ref.experiments.iekf.study import StudyConfig, StudyResult, run_study
 from vslam_ref.metrics.consistency import mean_band
+from vslam_ref.support.config import without_reason
+from vslam_ref.support.json_text import to_json
 from vslam_ref.worlds.vehicle_field import VehicleFieldConfig
 
 SMALL = StudyConfig(

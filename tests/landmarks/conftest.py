@@ -10,7 +10,7 @@ import pytest
 
 from vslam_ref.experiments.moving.localisation import localise
 from vslam_ref.grids import Lattice, LogOddsGrid, MapConfig
-from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig
+from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, Recording, simulate
 
 SURE = 5.0

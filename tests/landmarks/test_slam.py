@@ -11,8 +11,8 @@ from vslam_ref.experiments.moving.localisation import localise
 from vslam_ref.experiments.moving.readings import increment_of, scan_of
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids import LogOddsGrid, MapConfig, Scan
-from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig, LandmarkConfig, MatchConfig, distance_field
-from vslam_ref.grids.landmarks.slam import on_moving
+from vslam_ref.grids.landmarks import LandmarkConfig, MatchConfig, distance_field
+from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig, on_moving
 from vslam_ref.worlds.floor_plan import cast
 
 from .conftest import HallRun

@@ -9,10 +9,10 @@ import pytest
 
 from vslam_ref.experiments import grids_landmarks, grids_localisation, grids_separation
 from vslam_ref.experiments.framework import InputError, Result, RunContext, load
-from vslam_ref.experiments.framework.config import without_reason
 from vslam_ref.experiments.moving import choice, localisation, separation
 from vslam_ref.experiments.moving.readings import generator
 from vslam_ref.grids import MapConfig
+from vslam_ref.support.config import without_reason
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, simulate
 
 STUDIES = {
@@ -157,7 +157,7 @@ def test_beams_are_judged_by_what_they_end_on() -> None:
     assert total[0] <= min(total[1], total[2])
     assert total[2] > 100
     from vslam_ref.experiments.moving.readings import increment_of, scan_of
-    from vslam_ref.grids.landmarks import GridSlam
+    from vslam_ref.systems.grid_slam import GridSlam
 
     slam, mine = GridSlam(recording.poses[0], config), np.zeros(3)
     for k in range(len(recording)):

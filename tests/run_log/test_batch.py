@@ -11,12 +11,20 @@ import pytest
 pytest.importorskip("scipy.sparse", reason="sparse normal equations")
 
 from vslam_ref.datasets import mrclam
-from vslam_ref.experiments.slam_log import compare, identify
-from vslam_ref.experiments.slam_log.batch import STEPS, _Problem, solve_batch
-from vslam_ref.experiments.slam_log.preintegration import dead_reckoning, preintegrate
+from vslam_ref.experiments.slam_log import compare
 from vslam_ref.filters import vehicle
 from vslam_ref.metrics.alignment import align_rigid
-from vslam_ref.systems.slam_log import Calibration, RunSettings, SlamLog, build_timeline, run_log, summary
+from vslam_ref.systems.slam_log import (
+    Calibration,
+    RunSettings,
+    SlamLog,
+    build_timeline,
+    identify,
+    run_log,
+    summary,
+)
+from vslam_ref.systems.slam_log.batch import STEPS, _Problem, solve_batch
+from vslam_ref.systems.slam_log.preintegration import dead_reckoning, preintegrate
 
 CERTAIN = RunSettings(start_sigma_position=0.0, start_sigma_heading=0.0)
 

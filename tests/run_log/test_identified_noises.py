@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("scipy.sparse", reason="identification")
 
+from vslam_ref.commands.identify import read_logs
 from vslam_ref.datasets import catalogue, mrclam, noise
-from vslam_ref.experiments.slam_log import identify
-from vslam_ref.systems.slam_log import Calibration, run_log
+from vslam_ref.systems.slam_log import Calibration, identify, run_log
 
 NAMES = ("mrclam", "victoria_park")
 
@@ -21,7 +21,7 @@ NAMES = ("mrclam", "victoria_park")
 def test_a_document_says_what_why_and_how(name: str) -> None:
     document = noise.document(name)
     assert noise.calibration(name) == Calibration.from_mapping(document["values"])
-    assert document["command"] == f"python -m vslam_ref.experiments.slam_log.identify {name}"
+    assert document["command"] == f"vslam-ref identify {name}"
     assert document["evidence"]["truth_used"] is False
     assert len(document["method"]) > 200
     assert set(document["evidence"]["standard_errors"]) == set(identify.FREE[name])
@@ -67,7 +67,7 @@ def test_sightings_repeated_at_rest_show_the_sensor_noise(
 @pytest.mark.slow
 @pytest.mark.skipif(catalogue.find("utias_mrclam") is None, reason="utias_mrclam is not in VSLAM_REF_DATA")
 def test_the_committed_noises_are_likelier_than_their_neighbours() -> None:
-    logs = identify.read_logs("mrclam")
+    logs = read_logs("mrclam")
     values = noise.calibration("mrclam")
 
     def likelihood(calibration: Calibration) -> float:

@@ -181,7 +181,7 @@ def test_summed_odometry_changes_no_result() -> None:
 def test_the_batch_solution_is_the_bound(number: int) -> None:
     pytest.importorskip("scipy.sparse", reason="the batch solution")
     from vslam_ref.experiments.slam_log import compare
-    from vslam_ref.experiments.slam_log.batch import solve_batch
+    from vslam_ref.systems.slam_log.batch import solve_batch
 
     log, truth = robot(number)
     start = run(number, "ekf")

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.filters.ekf_slam import EkfSlam
 from vslam_ref.filters.ekf_step import ekf_step
 from vslam_ref.filters.estimates import SlamFilter, room_for_innovation
-
-Array = NDArray[np.float64]
 
 SEEN = 5
 """Landmarks seen in a step."""

@@ -15,11 +15,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.bench.ekf_world import World
-
-Array = NDArray[np.float64]
 
 WAYS = ("users", "one at a time", "stacked")
 

@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from vslam_ref import _kernels
+from vslam_ref.arrays import Array
 from vslam_ref.bench.rows import row
 from vslam_ref.bench.timing import paired
 from vslam_ref.datasets import carmen, catalogue
 from vslam_ref.grids import MapConfig, StaticDynamicMap, inverse_sensor, static_dynamic
 from vslam_ref.grids.log_odds import log_odds
 from vslam_ref.grids.plain import apply_plain
-
-Array = NDArray[np.float64]
 
 BEAMS, CELLS, RESOLUTION, HALF = 360, 400, 0.1, 19.5
 GOALS_OG_1 = {"numpy": 30.0, "numba": 300.0}

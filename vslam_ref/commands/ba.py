@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.datasets.bundle_files import read_bundle
     from vslam_ref.estimation.bundle import Options, bundle_adjust
     from vslam_ref.estimation.bundle.diagnosis import diagnose
-    from vslam_ref.experiments.framework.config import apply_overrides
+    from vslam_ref.support.config import apply_overrides
 
     targets = _targets(options)
     settings = apply_overrides(Options(), options.set)
@@ -122,7 +122,7 @@ KEYS = (
 
 def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
     """Checked paths of all outputs, before any work."""
-    from vslam_ref.experiments.framework import files
+    from vslam_ref.support import files
 
     targets = {"json": json_target(options)}
     for name in ("out", "ply"):

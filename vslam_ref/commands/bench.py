@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the suites one after the other and print their numbers."""
     import importlib
 
-    from vslam_ref.experiments.framework.errors import InputError, suggestion
+    from vslam_ref.support.errors import InputError, suggestion
 
     for name in options.suites:
         if name not in SUITES:

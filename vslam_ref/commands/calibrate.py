@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from vslam_ref.commands.options import add_json, json_target, write_json
 
 if TYPE_CHECKING:
-    from vslam_ref.datasets.checkerboard import Array
+    from vslam_ref.arrays import Array
     from vslam_ref.estimation.calibration import Board, Calibration
 
 HELP = "calibrate a camera from images of a checkerboard"
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     """Find the corners, calibrate, print the numbers and write what was asked for."""
     from vslam_ref.datasets.pictures import image_files
     from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly
-    from vslam_ref.experiments.framework import files
+    from vslam_ref.support import files
 
     target = json_target(options)
     out = files.require_parent(options.out) if options.out is not None else None

@@ -87,8 +87,8 @@ def _plot_target(options: argparse.Namespace) -> Path | None:
     """Return the checked path of ``--plot``, before any work."""
     if options.plot is None:
         return None
-    from vslam_ref.experiments.framework import files
-    from vslam_ref.experiments.framework.errors import InputError
+    from vslam_ref.support import files
+    from vslam_ref.support.errors import InputError
 
     path = Path(options.plot)
     if path.suffix not in PLOTS:
@@ -112,9 +112,9 @@ def _notes(found: Evaluation, *read: tuple[str, TrajectoryFile]) -> list[str]:
 
 
 def _draw(path: Path, found: Evaluation, name: str, align: str) -> None:
-    from vslam_ref.experiments.framework import files
     from vslam_ref.plot.saving import figure_bytes
     from vslam_ref.plot.trajectory import trajectory_figure
+    from vslam_ref.support import files
 
     words = "not aligned" if align == "none" else f"aligned, {align}"
     figure = trajectory_figure(

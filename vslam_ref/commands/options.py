@@ -38,7 +38,7 @@ def json_target(options: argparse.Namespace) -> Path | None:
     """Return the checked path of ``--json``, or None; ``InputError`` if it cannot be written."""
     if options.json is None:
         return None
-    from vslam_ref.experiments.framework import files
+    from vslam_ref.support import files
 
     return files.require_parent(options.json)
 
@@ -47,7 +47,7 @@ def write_json(path: Path | None, content: Any) -> None:
     """Write the numbers to ``path`` in one step, if a path was given."""
     if path is None:
         return
-    from vslam_ref.experiments.framework import files
-    from vslam_ref.experiments.framework.results import to_json
+    from vslam_ref.support import files
+    from vslam_ref.support.json_text import to_json
 
     files.write_text(path, to_json(content))

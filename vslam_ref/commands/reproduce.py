@@ -58,8 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check everything, then run the experiments one after the other."""
-    from vslam_ref.experiments.framework import files
     from vslam_ref.experiments.framework import reproduce as framework
+    from vslam_ref.support import files
 
     work = _work(options)
     context = _context(options)
@@ -80,8 +80,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
     """Return each experiment with its config; ``InputError`` before anything has run."""
-    from vslam_ref.experiments.framework.errors import InputError
     from vslam_ref.experiments.framework.registry import load, summaries
+    from vslam_ref.support.errors import InputError
 
     if options.all == bool(options.ids):
         raise InputError(
@@ -94,7 +94,7 @@ def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
 
 def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:
     """Apply the options; with ``--all``, an experiment without runs or seed ignores these two."""
-    from vslam_ref.experiments.framework.config import find_setting
+    from vslam_ref.support.config import find_setting
 
     default = experiment.default()
     runs, seed = options.runs, options.seed

@@ -43,9 +43,9 @@ def run(options: argparse.Namespace) -> int:
     import time
 
     from vslam_ref.commands.tables import table
-    from vslam_ref.experiments.framework.config import apply_overrides
-    from vslam_ref.experiments.framework.provenance import versions
     from vslam_ref.experiments.slam_log import compare as logs
+    from vslam_ref.support.config import apply_overrides
+    from vslam_ref.support.provenance import versions
 
     target = json_target(options)
     out = _out(options)

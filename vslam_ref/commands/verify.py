@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of this command."""
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--program", metavar="CMD", help="command that answers lines")
-    which.add_argument("--module", metavar="NAME", help="Python module with answer(function, inputs)")
+    which.add_argument(
+        "--module", metavar="NAME", help="Python module, or file.py, with answer(function, inputs)"
+    )
     which.add_argument("--self", action="store_true", help="check this library")
     which.add_argument("--nees", metavar="FILE", help="judge a filter's simulated runs")
     parser.add_argument(
@@ -58,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, judge, print, and write what was asked for."""
-    from vslam_ref.experiments.framework import files
+    from vslam_ref.support import files
 
     target = json_target(options)
     page = files.require_parent(options.report) if options.report is not None else None

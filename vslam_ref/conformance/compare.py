@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.vectors_format import Case
 
-Array = NDArray[np.float64]
 Profile = Literal["float64", "float32"]
 WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 

@@ -31,13 +31,11 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.conformance.catalogue import Function
 from vslam_ref.conformance.compare import numbers
 from vslam_ref.geometry import se3
-
-Array = NDArray[np.float64]
 
 ROTATION_FIRST = [3, 4, 5, 0, 1, 2]
 ROTATION_FIRST_SIM3 = [3, 4, 5, 0, 1, 2, 6]

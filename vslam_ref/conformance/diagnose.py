@@ -11,15 +11,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.compare import Profile, compare, matches, numbers
 from vslam_ref.conformance.conventions import ROTATION_FIRST, ROTATION_FIRST_SIM3
 from vslam_ref.conformance.statistics import mistaken
 from vslam_ref.conformance.vectors_format import Case, VectorFile
-
-Array = NDArray[np.float64]
 
 
 def _inverse(x: Array) -> Array:

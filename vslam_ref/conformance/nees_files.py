@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 LARGEST = 2**30
 """Bytes of a file, and of what it unpacks to."""

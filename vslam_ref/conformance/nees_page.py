@@ -8,7 +8,7 @@ from pathlib import Path
 from vslam_ref.conformance.nees_files import Runs
 from vslam_ref.conformance.nees_runs import MEANINGS, Judgement
 from vslam_ref.conformance.report import STYLE
-from vslam_ref.experiments.framework import files
+from vslam_ref.support import files
 
 
 def write(path: Path, name: str, runs: Runs, found: Judgement) -> None:

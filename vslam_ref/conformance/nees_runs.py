@@ -27,12 +27,11 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.conformance.nees_files import Runs
 from vslam_ref.metrics import consistency
 
-Array = NDArray[np.float64]
 Word = Literal["consistent", "overconfident", "underconfident", "mixed", "invalid covariance"]
 
 FALSE_ALARM = 0.05

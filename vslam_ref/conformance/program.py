@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import importlib.util
 import json
 import queue
 import shlex
 import subprocess
+import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -47,13 +50,31 @@ class Asked(Protocol):
         """Let go."""
 
 
+def load_module(name: str) -> ModuleType:
+    """Import a module by its dotted name, or from a file ``*.py`` whose folder it may import from.
+
+    Raises
+    ------
+    ImportError
+        If there is no such module or file, or it imports what is not installed.
+    """
+    if not name.endswith(".py"):
+        return importlib.import_module(name)
+    path = Path(name).resolve()
+    if not path.is_file():
+        raise ImportError(f"no such file: {name}")
+    if str(path.parent) not in sys.path:
+        sys.path.insert(0, str(path.parent))
+    return importlib.import_module(path.stem)
+
+
 class InProcess:
     """A module with ``answer(function, inputs)``; NotImplementedError is "unsupported", others are errors."""
 
     def __init__(self, module: ModuleType | str) -> None:
         if isinstance(module, str):
             try:
-                module = importlib.import_module(module)
+                module = load_module(module)
             except ImportError as error:
                 raise ValueError(f"--module {module}: {error}") from None
         answer = getattr(module, "answer", None)

@@ -1,6 +1,6 @@
 """A module as a program: lines of JSON in, lines of JSON out.
 
-    python -m vslam_ref.conformance.serve my_package.adapter
+    python -m vslam_ref.conformance.serve my_package.adapter      # or my_adapter.py
 
 This is the example of the protocol in Python.  Nothing but replies may go to standard output; what the module
 prints is sent to standard error.  Zero or more blank lines are skipped; a line that is no request is answered
@@ -10,11 +10,12 @@ with an error, without an id.
 from __future__ import annotations
 
 import contextlib
-import importlib
 import json
 import sys
 from collections.abc import Callable, Iterable
 from typing import Any, TextIO
+
+from vslam_ref.conformance.program import load_module
 
 Answer = Callable[[str, dict[str, Any]], Any]
 
@@ -50,10 +51,10 @@ def serve(answer: Answer, requests: Iterable[str], out: TextIO) -> None:
 def main(arguments: list[str]) -> int:
     """Serve the module that is named."""
     if len(arguments) != 1:
-        sys.stderr.write("usage: python -m vslam_ref.conformance.serve MODULE\n")
+        sys.stderr.write("usage: python -m vslam_ref.conformance.serve MODULE|FILE.py\n")
         return 2
     try:
-        answer = importlib.import_module(arguments[0]).answer
+        answer = load_module(arguments[0]).answer
     except (ImportError, AttributeError) as error:
         sys.stderr.write(f"serve {arguments[0]}: {error}\n")
         return 2

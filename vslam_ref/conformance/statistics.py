@@ -10,12 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.conformance.compare import RIGHT, Difference, numbers
 from vslam_ref.conformance.vectors_format import Case
-
-Array = NDArray[np.float64]
 
 
 def mean_trace(x: Array) -> float:

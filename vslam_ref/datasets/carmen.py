@@ -28,7 +28,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.datasets.text import MAX_BYTES, Array, FormatError, IntArray, number, read_lines
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.text import MAX_BYTES, FormatError, number, read_lines
 from vslam_ref.grids.scan import LaserScanner, Scan
 
 SCAN = "FLASER"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 LEAST_CORNERS = 3
 """The detector takes no smaller board, in either direction."""

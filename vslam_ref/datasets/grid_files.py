@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.picture_size import require_size
-from vslam_ref.datasets.text import Array, FormatError
+from vslam_ref.datasets.text import FormatError
 from vslam_ref.grids.lattice import MAX_CELLS, Lattice
 from vslam_ref.grids.log_odds import DECIDED, LogOddsGrid, log_odds
 

@@ -13,9 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.datasets.text import Array
-
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
 
 RATIO = 0.75
 """Largest ratio of the distances to the best and to the second partner."""

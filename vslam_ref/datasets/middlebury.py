@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array, FormatError, number, read_lines
+from vslam_ref.arrays import Array
+from vslam_ref.datasets.text import FormatError, number, read_lines
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
 

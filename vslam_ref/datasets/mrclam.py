@@ -21,11 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.text import (
-    Array,
     Columns,
     FormatError,
-    IntArray,
     existing,
     read_columns,
     require_integers,

@@ -20,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array, FormatError, number, read_lines
+from vslam_ref.arrays import Array
+from vslam_ref.datasets.text import FormatError, number, read_lines
 
 MAX_BYTES = 2**20
 """The largest of the 27 files of the collection has 0.2 MiB."""

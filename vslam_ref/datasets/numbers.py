@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.datasets.text import Array, FormatError, IntArray
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.text import FormatError
 
 ALLOWED = b"0123456789+-.eE \t\r\n"
 """No ``nan``, no ``inf``, no ``1_000``: a number of these files has nothing else."""

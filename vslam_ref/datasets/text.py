@@ -15,10 +15,8 @@ from pathlib import Path
 from typing import IO, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
 
 MAX_BYTES = 64 * 2**20
 """Unpacked size at which reading stops; the largest known log of this kind has 3 MiB."""

@@ -26,9 +26,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets import matfile
 from vslam_ref.datasets.mrclam import group_sightings
-from vslam_ref.datasets.text import LARGEST_INTEGER, Array, FormatError, IntArray, number, read_lines
+from vslam_ref.datasets.text import LARGEST_INTEGER, FormatError, number, read_lines
 from vslam_ref.systems.slam_log.log import SlamLog, Truth
 
 WHEELBASE = 2.83

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.estimation.least_squares import Options, Solution, minimise
 from vslam_ref.estimation.robust import Loss, norm_scale, tuned
 from vslam_ref.geometry import se3, so3
-from vslam_ref.geometry._arrays import Array, as_array
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview.resection import resect_linear, tilted_twin
 

@@ -15,7 +15,6 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vslam_ref.experiments.bundle.gauges import (
     CHOSEN,
@@ -34,7 +33,6 @@ from vslam_ref.metrics.consistency import mean_band, percentile_interval, resamp
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.01
 """Of a whole claim that rests on bands."""

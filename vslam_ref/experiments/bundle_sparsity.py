@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.bundle.sparsity import (
     Arrow,
     Counts,
@@ -32,7 +33,6 @@ from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContex
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 PREDICTED = 1e-9
 """Relative difference of a count and its formula: none but rounding of large sums."""

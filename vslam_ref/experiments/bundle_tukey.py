@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.bundle.wrong import (
     FAR_SHARE,
     METHODS,
@@ -35,7 +36,6 @@ from vslam_ref.metrics.consistency import percentile_interval, resample_weights
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 BROKEN = 3.0
 """Times the error of least squares on honest data, from which an adjustment is broken."""

@@ -6,8 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.choice import MODES, ChoiceConfig, Run, Task, simulate_run
 from vslam_ref.experiments.moving.readings import interval_of_means, null_rate
@@ -15,7 +15,6 @@ from vslam_ref.experiments.moving.readings import interval_of_means, null_rate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 FOUND_OUT = 0.9
 """Share of landmarks, whose corner moved away before the robot's eyes, that must be withdrawn."""

@@ -10,8 +10,8 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.localisation import (
     SPOILED,
@@ -26,7 +26,6 @@ from vslam_ref.experiments.moving.readings import interval_of_means, interval_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 HALF = 0.5
 """Aim: RMSE with separation over RMSE with a plain grid in the densest crowd."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.readings import generator, scan_of
 from vslam_ref.grids import LogOddsGrid, MapConfig, StaticDynamicMap
@@ -38,8 +38,6 @@ from vslam_ref.worlds.floor_plan.plan import schedule
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FROM, TO = (4.65, 1.25), (2.65, 3.85)
 """Middle of the chair before and after, metres."""

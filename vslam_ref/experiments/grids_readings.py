@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.readings import generator, interval_of_means, null_rate
 from vslam_ref.experiments.moving.separation import SeparationConfig, measure, precision_recall
@@ -23,7 +23,6 @@ from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfi
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 READINGS: tuple[tuple[Memory, Where], ...] = (
     ("text", "free"),

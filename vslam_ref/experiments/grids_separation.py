@@ -6,8 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.moving.readings import interval_of_means, null_rate
 from vslam_ref.experiments.moving.separation import (
@@ -22,7 +22,6 @@ from vslam_ref.experiments.moving.separation import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 STATIC_AIM, MOVING_AIM = 0.97, 0.85
 """Aims for precision and recall of static cells, and of cells that move now, at 20 % crowd."""

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.iekf import neighbours
 from vslam_ref.experiments.iekf.judge import TELLING
@@ -30,7 +31,6 @@ from vslam_ref.worlds.vehicle_field import draw_noise
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 SOURCE = "UKF-M, 2D SLAM benchmark; Huang et al. 2010"
 SAMPLES = 2000

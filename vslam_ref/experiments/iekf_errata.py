@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.iekf.study import StudyConfig, drive, run_noise, study_field
 from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, Variant
@@ -31,7 +31,6 @@ from vslam_ref.worlds.vehicle_field import VehicleField
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 VARIANTS = {
     "corrected": Variant(),

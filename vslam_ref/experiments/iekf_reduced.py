@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.bench.filters import PAPER_POSE_RATIO, cycle_ratios
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.iekf.study import StudyConfig, run_noise, study_field
@@ -25,7 +25,6 @@ from vslam_ref.metrics.consistency import pose_error
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 BOUND = 1e-10
 """Metres, radians and their squares: the goal of the reduction."""

@@ -17,8 +17,8 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.tukey.scene import (
     COSTS,
@@ -36,7 +36,6 @@ from vslam_ref.metrics.consistency import percentile_interval, resample_weights
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 FOUND = 1.0
 """Mean displacement of the landmarks, in sigma, up to which a pose is found."""

@@ -15,12 +15,9 @@ import copy
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
 
 _XY = np.arange(2)
 

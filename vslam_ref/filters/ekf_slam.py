@@ -21,8 +21,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.filters.block_covariance import Blocks, landmark_update
 from vslam_ref.filters.ekf_step import ekf_predict, ekf_update
@@ -36,9 +37,6 @@ from vslam_ref.filters.estimates import (
     room_for_innovation,
 )
 from vslam_ref.geometry import se2, so2
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Truth(NamedTuple):

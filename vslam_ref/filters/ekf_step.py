@@ -15,15 +15,12 @@ books around them: which landmark stands in which column, and how a new one ente
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import observation
 from vslam_ref.filters.block_covariance import landmark_update, map_columns
 from vslam_ref.geometry import so2
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _FG = np.array([[1.0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 0, 1]])
 """The constant part of F and G, side by side."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters.vehicle import Increment
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Innovation(NamedTuple):

@@ -38,14 +38,12 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.filters.carleman_ekf import lift, moments
 from vslam_ref.filters.ekf_slam import EkfSlam
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Step(NamedTuple):

@@ -33,11 +33,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import so2
-
-Array = NDArray[np.float64]
 
 
 class Converted(NamedTuple):

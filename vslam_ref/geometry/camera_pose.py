@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array, times, transpose
 from vslam_ref.geometry import se3
-from vslam_ref.geometry._arrays import Array, as_array, times, transpose
 
 
 def camera_from_world(R_cam_world: ArrayLike, p_world: ArrayLike, X_world: ArrayLike) -> Array:

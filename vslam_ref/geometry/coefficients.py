@@ -15,7 +15,7 @@ from math import factorial
 
 import numpy as np
 
-from vslam_ref.geometry._arrays import Array
+from vslam_ref.arrays import Array
 
 SMALL = 1.0
 """Below this angle (radians), or length of (sigma, theta), the series are used.

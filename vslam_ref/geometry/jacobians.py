@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from vslam_ref.geometry._arrays import Array
+from vslam_ref.arrays import Array
 
 
 class Acted(NamedTuple):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.geometry._arrays import Array, as_array
+from vslam_ref.arrays import Array, as_array
 
 _TOLERANCE = 8 * float(np.finfo(np.float64).eps)
 """Relative to the largest singular value: what an SVD of a 3 x 3 matrix may be off."""

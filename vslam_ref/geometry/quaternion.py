@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.geometry._arrays import Array, as_array
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry.coefficients import rotation_coefficients
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array, blocks
 from vslam_ref.geometry import so2
-from vslam_ref.geometry._arrays import Array, as_array, blocks
 from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
 
 DOF = 3

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array, blocks, times, transpose
 from vslam_ref.geometry import so3
-from vslam_ref.geometry._arrays import Array, as_array, blocks, times, transpose
 from vslam_ref.geometry.coefficients import rotation_coefficients
 from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.geometry._arrays import Array, as_array, times, transpose
+from vslam_ref.arrays import Array, as_array, times, transpose
 
 DOF = 1
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array, times, transpose
 from vslam_ref.geometry import quaternion
-from vslam_ref.geometry._arrays import Array, as_array, times, transpose
 from vslam_ref.geometry.coefficients import (
     inverse_coefficients,
     rotation_coefficients,

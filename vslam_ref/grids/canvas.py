@@ -10,10 +10,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.scan import BeamCounts, ScanLike, ScanReport, sort_beams
-
-Array = NDArray[np.float64]
 
 
 class Canvas:

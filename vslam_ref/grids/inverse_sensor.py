@@ -24,11 +24,10 @@ from dataclasses import dataclass, field, fields
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.grids.log_odds import FREE, OCCUPIED, UNKNOWN, log_odds
 
-Array = NDArray[np.float64]
 Where = Literal["free", "unknown"]
 WHERES: tuple[Where, ...] = ("free", "unknown")
 

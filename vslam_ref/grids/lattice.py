@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
 
 BLOCK = 64
 """Cells by whose multiples a rectangle grows."""

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.grids.lattice import Array, Lattice
+from vslam_ref.arrays import Array
+from vslam_ref.grids.lattice import Lattice
 
 DECIDED = 0.9
 """A cell is decided above this probability (A's chapter 4) or, as free, below one minus it."""

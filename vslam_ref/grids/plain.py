@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
 from vslam_ref.grids.map_config import MapConfig
 from vslam_ref.grids.rays import MISS, look
-
-Array = NDArray[np.float64]
 
 
 class PlainMap(Canvas):

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
+
 Mask = NDArray[np.bool_]
 
 QUANTA = 4096

@@ -31,9 +31,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
+
 Reading = Literal["printed", "unchanged", "forgetful"]
 Table = Literal["conditioned", "evidence"]
 READINGS: tuple[Reading, ...] = ("printed", "unchanged", "forgetful")

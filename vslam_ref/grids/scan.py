@@ -21,7 +21,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 
 class ScanLike(Protocol):

@@ -34,13 +34,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.grids import rays
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, FREE, OCCUPIED, UNKNOWN, LogOddsGrid, log_odds, states
 from vslam_ref.grids.map_config import MapConfig
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 EIGHT = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
 """Directions to the neighbours of a cell."""

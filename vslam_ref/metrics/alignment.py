@@ -8,11 +8,10 @@ centred, the sum is smallest where ``sum q_k^T R p_k`` is largest, which
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import so2
-
-Array = NDArray[np.float64]
 
 
 def align_rigid(points: ArrayLike, reference: ArrayLike) -> Array:

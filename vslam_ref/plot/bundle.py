@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 LOSS_LOOKS: dict[str, style.Look] = {
     "l2": style.Look("least squares", style.GREY, ":"),

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot import style
 
 if TYPE_CHECKING:
     from vslam_ref.estimation.bundle import Scene
 
-Array = NDArray[np.float64]
 
 GAUGE_LOOKS: dict[str, tuple[style.Look, str]] = {
     "free": (style.Look("free: nothing held", style.BLUE, "-"), "o"),

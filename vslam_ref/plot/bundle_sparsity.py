@@ -13,10 +13,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 PARTS = ListedColormap(["#FFFFFF", style.BLUE, style.ORANGE, style.GREEN])
 """Nothing; among views; between views and points; among points."""

@@ -16,12 +16,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.metrics import consistency
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 ONE_SIDED, TWO_SIDED = (0, (5, 2)), (0, (1, 2))
 """Dashes of the chi-squared lines."""

@@ -9,15 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2
 from vslam_ref.grids import LogOddsGrid
 from vslam_ref.grids.landmarks import Landmark
 from vslam_ref.plot import style
 from vslam_ref.worlds.floor_plan import Recording
-
-Array = NDArray[np.float64]
 
 STATIC, MOVING, ROBOT, MARK = style.BLACK, style.VERMILION, style.BLUE, style.GREEN
 MODES: dict[str, style.Look] = {

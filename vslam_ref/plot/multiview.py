@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
 
 if TYPE_CHECKING:
     from vslam_ref.geometry.multiview import Views
 
-Array = NDArray[np.float64]
 
 SIZE = (640.0, 480.0)
 """Pixels of the pictures."""

@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.metrics import consistency
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 LOG_FROM = 5.0
 """From this ratio of the largest to the smallest drawn value on, the axis is logarithmic."""

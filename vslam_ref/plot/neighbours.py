@@ -9,11 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 STARTS = {"zero": "start known, $P_0$ = 0", "high": "$P_0$ = diag(1, 1, 0.03)"}
 

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 OUTLINE = np.array([[1.0, 0.0], [-0.5, 0.5], [-0.5, -0.5]])
 """A vehicle of length 1.5 that looks along +x, its reference point at the origin."""

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 _LINES = {
     "reduced/pose": ("pose, 4 + 2 n states", style.BLUE, "-"),

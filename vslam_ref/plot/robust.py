@@ -7,12 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Loss
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 LOOKS: dict[str, style.Look] = {
     "printed": style.Look("A2.8 as printed", style.VERMILION, "-"),

@@ -11,9 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 COMPONENTS = (("x error", "m"), ("y error", "m"), ("heading error", "rad"))
 BATCH = style.Look("batch least squares", style.BLACK, ":")

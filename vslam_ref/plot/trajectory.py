@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 AXES = "xyz"
 TRUTH = style.Look("truth", style.BLACK, "--")

@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.plot import style
-
-Array = NDArray[np.float64]
 
 COLOURS = (style.BLUE, style.VERMILION, style.ORANGE, style.YELLOW, style.BLACK, style.GREEN, style.PURPLE)
 LINES = ("-", "--", "-.", "-", (0, (6, 2)), ":", (0, (3, 1, 1, 1, 1, 1)))

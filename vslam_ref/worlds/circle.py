@@ -23,12 +23,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.worlds.vehicle_field import Sighting
-
-Array = NDArray[np.float64]
 
 
 def _assume(default: Any, unit: str, reason: str) -> Any:

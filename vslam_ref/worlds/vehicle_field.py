@@ -20,12 +20,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import observation, vehicle
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def _assume(default: float, unit: str, reason: str) -> float:

@@ -24,13 +24,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.geometry import so2
 from vslam_ref.worlds.vehicle_field import Sighting
-
-Array = NDArray[np.float64]
 
 MIN_RANGE = 1.0
 """Metres; nearer landmarks are not reported, as the conversion from range and bearing needs r >> sigma_R."""

@@ -11,12 +11,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle import BundleProblem, Scene
 from vslam_ref.geometry import quaternion, se3, so3
-
-Array = NDArray[np.float64]
 
 
 class Solved(NamedTuple):

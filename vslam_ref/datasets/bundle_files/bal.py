@@ -19,15 +19,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.atomic import write_bytes
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, load, require_once, require_room
 from vslam_ref.datasets.bundle_files.looking_back import DOWN, FLIP, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.numbers import Numbers, read_numbers
-from vslam_ref.datasets.text import Array, FormatError
+from vslam_ref.datasets.text import FormatError
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.geometry import so3
 from vslam_ref.geometry.cameras import Pinhole, Radtan
+from vslam_ref.support.files import write_bytes
 
 COUNTS = ("cameras", "points", "observations")
 CAMERA = ("r1", "r2", "r3", "t1", "t2", "t3", "f", "k1", "k2")

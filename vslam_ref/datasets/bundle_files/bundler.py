@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.loading import (
     FARTHEST,
     load,
@@ -32,7 +33,7 @@ from vslam_ref.datasets.bundle_files.loading import (
 from vslam_ref.datasets.bundle_files.looking_back import DOWN, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.numbers import Numbers, read_numbers
-from vslam_ref.datasets.text import Array, FormatError, IntArray, read_lines
+from vslam_ref.datasets.text import FormatError, read_lines
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.geometry.cameras import Radtan
 

@@ -33,9 +33,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, load, require_once, require_room, rotations
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import Array, FormatError, IntArray
+from vslam_ref.datasets.text import FormatError
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations, Scene
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Radtan

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array, FormatError, IntArray, read_bytes
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.text import FormatError, read_bytes
 from vslam_ref.geometry import so3
 
 LARGEST = 2 * 2**30

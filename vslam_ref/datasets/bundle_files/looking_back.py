@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle.problem import Freedom, Scene, freedom
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Radtan

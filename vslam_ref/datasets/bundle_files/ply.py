@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.datasets.atomic import write_bytes
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import Array, IntArray
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry import se3
+from vslam_ref.support.files import write_bytes
 
 VERTEX = np.dtype([("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])

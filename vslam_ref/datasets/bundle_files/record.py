@@ -8,7 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.estimation.bundle.problem import BundleProblem, IntArray, Scene
+from vslam_ref.arrays import IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem, Scene
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.calibration_files.record import Array, CameraFile
+from vslam_ref.arrays import Array
+from vslam_ref.datasets.calibration_files.record import CameraFile
 from vslam_ref.datasets.calibration_files.yaml_nodes import build, read_yaml, rigid
 from vslam_ref.geometry.cameras import Camera, Fisheye, Radtan
 

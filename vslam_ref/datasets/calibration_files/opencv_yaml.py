@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.atomic import write_bytes
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files.record import CameraFile
-from vslam_ref.datasets.calibration_files.yaml_nodes import Array, Node, build, read_yaml
+from vslam_ref.datasets.calibration_files.yaml_nodes import Node, build, read_yaml
 from vslam_ref.geometry.cameras import MODELS, Camera
+from vslam_ref.support.files import write_bytes
 
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "M")
 DISTORTION = ("distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "D1")

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

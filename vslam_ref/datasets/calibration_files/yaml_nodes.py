@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.text import FormatError, number
 
-Array = NDArray[np.float64]
 MAX_BYTES = 2**20
 LONGEST = 1e12
 MAX_DEPTH = 32

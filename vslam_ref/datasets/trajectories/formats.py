@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array, IntArray
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import quaternion
 from vslam_ref.metrics.trajectory.poses import Trajectory
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array, Columns, FormatError, IntArray, number, read_columns, read_lines
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.text import Columns, FormatError, number, read_columns, read_lines
 from vslam_ref.datasets.trajectories.formats import (
     EUROC,
     EUROC_EXTRA,

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.atomic import write_bytes
-from vslam_ref.datasets.text import Array, IntArray
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.trajectories.formats import EUROC, FORMATS, TUM, AsRead, matrices, seconds
 from vslam_ref.geometry import quaternion
 from vslam_ref.metrics.trajectory.poses import Trajectory
+from vslam_ref.support.files import write_bytes
 
 
 def write(path: Path, trajectory: Trajectory, format: str, as_read: AsRead | None = None) -> None:

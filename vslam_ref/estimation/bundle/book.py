@@ -25,7 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from vslam_ref.estimation.bundle.problem import Array, BundleProblem, Scene
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.bundle.problem import BundleProblem, Scene
 from vslam_ref.estimation.robust import L2, Loss
 
 Key = tuple[str, int]

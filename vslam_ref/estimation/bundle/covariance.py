@@ -26,10 +26,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle import reduced_system, schur
 from vslam_ref.estimation.bundle.gauge import fix_gauge, gauge_directions
 from vslam_ref.estimation.bundle.normal import Normal, normal_equations
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.structure import Structure, structure
 from vslam_ref.estimation.bundle.weights import whitened

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import BundleProblem, IntArray
+from vslam_ref.arrays import IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.projection import reprojection
 
 

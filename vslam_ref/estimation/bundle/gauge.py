@@ -19,7 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array, BundleProblem, Freedom, Scene
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Scene
 from vslam_ref.geometry import camera_pose, se3, so3
 
 DIRECTIONS = ("x", "y", "z", "turn x", "turn y", "turn z", "scale")

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.bundle.problem import Array, BundleProblem, Freedom, IntArray, Scene
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Scene
 from vslam_ref.geometry import camera_pose
 
 

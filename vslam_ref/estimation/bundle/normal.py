@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.estimation.bundle.problem import Array, IntArray
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle.projection import (
     Linearised,
     Links,

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import BoolArray, BundleProblem
+from vslam_ref.arrays import BoolArray
+from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.projection import reprojection
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.solver import Options, Progress, bundle_adjust

@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan, pose_jacobian
 from vslam_ref.geometry.cameras import projection as cameras
 from vslam_ref.geometry.cameras.interface import MIN_DEPTH

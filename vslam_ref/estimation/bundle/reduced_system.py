@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array
+from vslam_ref.arrays import Array
 
 Method = Literal["dense", "banded"]
 

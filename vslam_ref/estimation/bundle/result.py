@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem
+from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.estimation.bundle.problem import BundleProblem
 
 Reason = Literal[
     "cost",

@@ -27,8 +27,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle.normal import Normal, sum_by_point
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle.structure import Structure
 
 EPS = float(np.finfo(np.float64).eps)

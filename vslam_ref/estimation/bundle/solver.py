@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import projection, reduced_system, schur
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, Scene
+from vslam_ref.estimation.bundle.problem import BundleProblem, Scene
 from vslam_ref.estimation.bundle.projection import State
 from vslam_ref.estimation.bundle.result import BundleResult, Iteration, Reason
 from vslam_ref.estimation.bundle.step import DAMPED, Point, Step, System, damped_step, moved, system_at

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import reduced_system, schur
 from vslam_ref.estimation.bundle.normal import Normal, normal_equations
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem
+from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.projection import State
 from vslam_ref.estimation.bundle.schur import Diagonals
 from vslam_ref.estimation.bundle.structure import Structure

@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array, BoolArray, BundleProblem, IntArray, Observations
+from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.estimation.bundle.projection import Links, State
 from vslam_ref.estimation.bundle.weights import whitener
 

@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.bundle.problem import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.robust import L2, Loss, norm_scale
 
 ScaleRule = float | Literal["adaptive"]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.calibration.board import Array, IntArray
+from vslam_ref.arrays import Array, IntArray
 
 
 class Blocks(NamedTuple):

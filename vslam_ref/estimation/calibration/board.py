@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
+
 IntArray = NDArray[np.intp]
 
 LEAST_CORNERS = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.calibration.board import Array
+from vslam_ref.arrays import Array
 
 
 def homography(X_plane: ArrayLike, x_image: ArrayLike) -> Array:

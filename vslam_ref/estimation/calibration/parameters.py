@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vslam_ref.estimation.calibration.board import Array
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera
 
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import Arrow, arrow
-from vslam_ref.estimation.calibration.board import Array, Corners
+from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.robust import Loss
 from vslam_ref.geometry import se3

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import reduce
-from vslam_ref.estimation.calibration.board import Array, Corners
+from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import Point
 from vslam_ref.estimation.calibration.start import Start

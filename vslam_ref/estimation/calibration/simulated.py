@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.estimation.calibration.board import Array, Board, View
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.calibration.board import Board, View
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera
 

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.estimation.calibration.board import LEAST_CORNERS, Array, Corners
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.calibration.board import LEAST_CORNERS, Corners
 from vslam_ref.estimation.calibration.homography import homography
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import State, residual

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.calibration.board import Array
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.nearest import nearest_rotation
 

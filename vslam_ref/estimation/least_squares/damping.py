@@ -26,7 +26,8 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from vslam_ref.estimation.least_squares.linear import Array, column_lengths
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.least_squares.linear import column_lengths
 
 Scaling = Literal["largest", "columns", "none"]
 

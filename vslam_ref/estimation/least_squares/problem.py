@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.least_squares.linear import EPS, Array, column_lengths
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.least_squares.linear import EPS, column_lengths
 from vslam_ref.estimation.robust import L2, Loss
 
 Function = Callable[[Any], ArrayLike]

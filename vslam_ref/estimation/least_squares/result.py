@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from vslam_ref.estimation.least_squares.linear import Array, Covariance, covariance
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.least_squares.linear import Covariance, covariance
 
 Reason = Literal[
     "gradient", "step", "cost", "max_iterations", "stalled", "singular", "not_finite", "no_residuals"

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.least_squares.damping import Damping, DampingState, Nielsen
-from vslam_ref.estimation.least_squares.linear import Array, column_lengths, damped_step
+from vslam_ref.estimation.least_squares.linear import column_lengths, damped_step
 from vslam_ref.estimation.least_squares.problem import Function, Plus, Point, Problem, add
 from vslam_ref.estimation.least_squares.result import Iteration, Reason, Solution
 from vslam_ref.estimation.robust import L2, Loss

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.robust.losses import Array, Loss
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.robust.losses import Loss
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.robust.losses import Array, Loss
+from vslam_ref.arrays import Array
+from vslam_ref.estimation.robust.losses import Loss
 
 Library = Literal["ceres", "scipy", "gtsam", "opencv", "ptam"]
 

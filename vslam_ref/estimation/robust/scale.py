@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.robust.losses import Array
+from vslam_ref.arrays import Array
 
 MAD_1D = 1.482602218505602
 """1 / 0.6745: from the median of absolute scalars to sigma."""

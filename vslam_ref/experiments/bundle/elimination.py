@@ -11,14 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle import BundleProblem, Scene
 from vslam_ref.estimation.bundle.projection import Links, State, linearise, reprojection
 from vslam_ref.geometry import se3
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 DAMPING = 1e-3
 """Share of the diagonal that is added, so that the factor exists with a free gauge."""

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle import BundleProblem, Freedom, Options, Scene, bundle_adjust, freedom
 from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.estimation.bundle.gauge import fix_gauge
@@ -32,8 +33,6 @@ from vslam_ref.experiments.bundle.scene import (
     nearest_of_family,
 )
 from vslam_ref.geometry import camera_pose
-
-Array = NDArray[np.float64]
 
 GAUGES = ("free", "fixed", "badly", "tied")
 CHOSEN = ("free", "fixed", "badly")

@@ -7,13 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle import BundleProblem, Observations, Scene
 from vslam_ref.estimation.bundle.gauge import gauge_directions
 from vslam_ref.geometry import alignment, camera_pose, se3, so3
 from vslam_ref.geometry.cameras import Pinhole, projection
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 INTRINSICS = (500.0, 500.0, 320.0, 240.0)
 """fx, fy, cx, cy of every camera, pixels."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.bundle_files import read_bal
 from vslam_ref.estimation.bundle import BundleProblem, Freedom, Observations, Scene, reduced_system, schur
@@ -26,9 +27,6 @@ from vslam_ref.experiments.bundle.elimination import (
 from vslam_ref.experiments.bundle.scene import INTRINSICS, make_bundle
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole, projection
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 BAL_FILE = "problem-16-22106-pre.txt.bz2"
 

@@ -6,14 +6,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import Options, Robust, Scene, bundle_adjust
 from vslam_ref.estimation.robust import MAD_1D, MAD_NORM_2D, TUNED_95, Tukey, tuned
 from vslam_ref.experiments.bundle.scene import Bundle, make_bundle, moved_start, scene_error
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 METHODS = ("l2", "huber", "tukey", "adaptive", "ptam")
 WIDER = MAD_1D / MAD_NORM_2D

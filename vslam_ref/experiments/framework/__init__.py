@@ -17,15 +17,11 @@ An experiment is one module ``vslam_ref/experiments/<id with _ for ->.py``::
 ==============  ==========================================================================
 module          holds
 ==============  ==========================================================================
-``errors``      ``InputError``: bad input, told in one line
 ``claims``      ``Claim`` and its verdict
-``config``      ``key=value`` settings of frozen dataclasses, and their reasons
 ``experiment``  ``Experiment`` and ``RunContext``
 ``registry``    from an id to its experiment, imported on first use
-``results``     ``Result`` and the JSON that is written of it
-``provenance``  versions, git commit, platform
+``results``     ``Result``: what a run returns
 ``scheduler``   ``run_batches`` on one core, many cores or a Dask cluster
-``files``       files and folders that appear whole or not at all
 ``writer``      ``OUT/<id>/{figure.svg,figure.png,result.json,runs.npz}``
 ``report``      ``OUT/index.html``
 ``reproduce``   all of it in order
@@ -33,12 +29,12 @@ module          holds
 """
 
 from vslam_ref.experiments.framework.claims import Claim, Verdict, verdict
-from vslam_ref.experiments.framework.config import apply_overrides, assumptions, config_to_dict
-from vslam_ref.experiments.framework.errors import InputError
 from vslam_ref.experiments.framework.experiment import Experiment, RunContext, scale_runs
 from vslam_ref.experiments.framework.registry import load, register, summaries, unregister
 from vslam_ref.experiments.framework.results import Result
 from vslam_ref.experiments.framework.scheduler import run_batches
+from vslam_ref.support.config import apply_overrides, assumptions, config_to_dict
+from vslam_ref.support.errors import InputError
 
 __all__ = [
     "Claim",

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vslam_ref.experiments.framework.claims import Claim
-from vslam_ref.experiments.framework.config import apply_overrides, find_setting, replace_settings, settings
-from vslam_ref.experiments.framework.errors import InputError
 from vslam_ref.experiments.framework.results import Result
 from vslam_ref.experiments.framework.scheduler import run_batches
+from vslam_ref.support.config import apply_overrides, find_setting, replace_settings, settings
+from vslam_ref.support.errors import InputError
 
 if TYPE_CHECKING:
     from vslam_ref.plot.saving import Figure

@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vslam_ref.experiments.framework.errors import InputError, suggestion
 from vslam_ref.experiments.framework.experiment import Experiment
+from vslam_ref.support.errors import InputError, suggestion
 
 PACKAGE = "vslam_ref.experiments"
 _registered: dict[str, Experiment[Any]] = {}

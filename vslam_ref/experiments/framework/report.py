@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from vslam_ref.experiments.framework import files
 from vslam_ref.experiments.framework.claims import VERDICTS, WORST_FIRST
+from vslam_ref.support import files
 
 SIGNS = {"reproduced": "✓", "not reproduced": "✗", "not testable": "–"}
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vslam_ref.experiments.framework import files, report, writer
+from vslam_ref.experiments.framework import report, writer
 from vslam_ref.experiments.framework.claims import Claim
 from vslam_ref.experiments.framework.experiment import Experiment, RunContext
+from vslam_ref.support import files
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from vslam_ref import __version__
-from vslam_ref.experiments.framework.errors import InputError
+from vslam_ref.support.errors import InputError
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vslam_ref.experiments.framework import files
 from vslam_ref.experiments.framework.claims import Claim, check_distinct
-from vslam_ref.experiments.framework.config import assumptions, config_to_dict
 from vslam_ref.experiments.framework.experiment import Experiment
-from vslam_ref.experiments.framework.provenance import versions
-from vslam_ref.experiments.framework.results import Result, to_json
+from vslam_ref.experiments.framework.results import Result
+from vslam_ref.support import files
+from vslam_ref.support.config import assumptions, config_to_dict
+from vslam_ref.support.json_text import to_json
+from vslam_ref.support.provenance import versions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import IntArray
 from vslam_ref.datasets.video import Film
 from vslam_ref.experiments.grid_log.mapping import Moment
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import LogOddsGrid
 
 Bytes = NDArray[np.uint8]
-IntArray = NDArray[np.int64]
 
 VERMILION, BLUE, SKY = (213, 94, 0), (0, 114, 178), (86, 180, 233)
 MOST = 1280

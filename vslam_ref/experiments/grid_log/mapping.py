@@ -8,17 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.carmen import CarmenLog
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.grids import MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.clusters import Clusters, TrackConfig, Tracker, find_clusters
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid, entropy_bits
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

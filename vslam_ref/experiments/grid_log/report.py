@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.datasets import grid_files
-from vslam_ref.experiments.framework.results import to_json
 from vslam_ref.experiments.grid_log.mapping import Mapped
 from vslam_ref.grids.log_odds import LogOddsGrid
 from vslam_ref.plot.grids import log_figure
 from vslam_ref.plot.saving import figure_bytes
+from vslam_ref.support.json_text import to_json
 
 ROWS = (
     ("scans", "scans", ""),

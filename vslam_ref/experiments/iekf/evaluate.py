@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.iekf import worlds
-from vslam_ref.experiments.iekf.rules import Array, Rule, Scene
+from vslam_ref.experiments.iekf.rules import Rule, Scene
 from vslam_ref.experiments.iekf.sentences import Sentence
 from vslam_ref.experiments.iekf.worlds import Pick, Series
 from vslam_ref.metrics import consistency

@@ -12,10 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, verdict
 from vslam_ref.experiments.iekf.grid import BASELINE, NUMERIC
 from vslam_ref.experiments.iekf.rules import APART
-from vslam_ref.experiments.iekf.sensitivity import Array, Grid, Judged
+from vslam_ref.experiments.iekf.sensitivity import Grid, Judged
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
 from vslam_ref.metrics.consistency import bootstrap_interval, percentile_interval, resample_weights
 

@@ -26,9 +26,10 @@ from typing import TypedDict
 
 import numpy as np
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, verdict
 from vslam_ref.experiments.iekf.evaluate import Evaluation, evaluate_all
-from vslam_ref.experiments.iekf.rules import Array, Rule, Scene
+from vslam_ref.experiments.iekf.rules import Rule, Scene
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
 from vslam_ref.experiments.iekf.worlds import control_names
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.experiments.framework import Claim, verdict
 from vslam_ref.experiments.iekf.rules import APART, MARKED, MUCH
 from vslam_ref.filters.carleman_ekf import ReducedCarlemanEkf, carleman_ekf
@@ -23,9 +24,6 @@ from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.metrics.consistency import bootstrap_interval, nees, pose_error
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FILTERS = ("ekf", "iekf", "ekf-anchored")
 STARTS = ("zero", "high")

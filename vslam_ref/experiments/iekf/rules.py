@@ -15,9 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.metrics import consistency
 
-Array = NDArray[np.float64]
 Curves = tuple[Array, ...]
 
 DOF = 3

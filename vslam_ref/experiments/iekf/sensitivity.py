@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Verdict
 from vslam_ref.experiments.iekf.figures import study_arrays
 from vslam_ref.experiments.iekf.grid import BASELINE, Setting
@@ -15,8 +15,6 @@ from vslam_ref.experiments.iekf.judge import judge
 from vslam_ref.experiments.iekf.rules import Scene
 from vslam_ref.experiments.iekf.sentences import claim_ids
 from vslam_ref.experiments.iekf.study import run_study
-
-Array = NDArray[np.float64]
 
 
 class Judged(NamedTuple):

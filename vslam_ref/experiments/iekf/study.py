@@ -23,16 +23,14 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.metrics.consistency import nees_pose, nis, pose_error
 from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
-
-Array = NDArray[np.float64]
 
 FILTERS = ("ekf", "iekf", "ekf-anchored", "ekf-ideal")
 

@@ -12,15 +12,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids import MapConfig
-from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig, LandmarkConfig
+from vslam_ref.grids.landmarks import LandmarkConfig
+from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, Recording, simulate
-
-Array = NDArray[np.float64]
 
 MODES = ("forbidden", "allowed", "odometry")
 MOVED = 0.25

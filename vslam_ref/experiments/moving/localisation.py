@@ -18,16 +18,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
 from vslam_ref.geometry import se2
 from vslam_ref.grids import MapConfig, Scan, StaticDynamicMap
-from vslam_ref.grids.landmarks import GridSlam, GridSlamConfig
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
+from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
 from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording, simulate, turned
-
-Array = NDArray[np.float64]
 
 MODES = ("separated", "plain", "ideal")
 MATCHERS = ("robust", "squares")

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids import Scan
 from vslam_ref.metrics.consistency import percentile_interval, resample_weights
 from vslam_ref.worlds.floor_plan import Recording
-
-Array = NDArray[np.float64]
 
 DRAWS = 2000
 

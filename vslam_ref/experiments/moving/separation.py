@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.experiments.moving.readings import generator, scan_of
 from vslam_ref.grids import InverseSensor, LogOddsGrid, MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.log_odds import OCCUPIED
@@ -33,9 +33,6 @@ from vslam_ref.worlds.floor_plan import (
     simulate,
     turned,
 )
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MAPS = ("separated", "plain")
 JUDGED = 0.2

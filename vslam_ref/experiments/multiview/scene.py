@@ -8,16 +8,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.datasets import catalogue, matching, middlebury
 from vslam_ref.datasets.pictures import read_grey
 from vslam_ref.geometry import camera_pose
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.geometry.multiview import Views
 
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Pair = tuple[int, int]
 
 JUDGED_PAIRS: tuple[Pair, ...] = ((0, 1), (5, 6))

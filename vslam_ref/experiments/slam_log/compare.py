@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.datasets import catalogue, mrclam, noise, victoria_park
-from vslam_ref.experiments.framework.config import config_to_dict
-from vslam_ref.experiments.framework.errors import InputError, suggestion
 from vslam_ref.filters.estimates import MapEstimate
+from vslam_ref.support.config import config_to_dict
+from vslam_ref.support.errors import InputError, suggestion
 from vslam_ref.systems.slam_log import (
     FILTERS,
     Calibration,
@@ -29,9 +29,8 @@ from vslam_ref.systems.slam_log.runner import Seen
 from vslam_ref.systems.slam_log.timeline import build_timeline
 
 if TYPE_CHECKING:
-    from vslam_ref.experiments.slam_log.batch import Batch
+    from vslam_ref.systems.slam_log.batch import Batch
 
-Array = NDArray[np.float64]
 
 SETS = {"mrclam": "utias_mrclam", "victoria_park": "victoria_park"}
 """Name on the command line -> folder of the data set; the folder's name is accepted too."""
@@ -124,7 +123,7 @@ def compare(
     runs = {name: run_log(source.log, config.calibration, name, config.run) for name in names}
     bound = None
     if batch:
-        from vslam_ref.experiments.slam_log.batch import solve_batch
+        from vslam_ref.systems.slam_log.batch import solve_batch
 
         start = runs["ekf"] if "ekf" in runs else run_log(source.log, config.calibration, "ekf", config.run)
         bound = as_run(solve_batch(source.log, config.calibration, start), source.log, start.times)
@@ -136,7 +135,7 @@ def as_run(batch: Batch, log: SlamLog, times: Array) -> LogRun:
 
     Covariances are NaN: they are not computed.
     """
-    from vslam_ref.experiments.slam_log.preintegration import poses_between
+    from vslam_ref.systems.slam_log.preintegration import poses_between
 
     line = build_timeline(log, batch.calibration, times)
     poses = poses_between(line, batch.poses)

@@ -18,19 +18,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vslam_ref.experiments.framework import files
-from vslam_ref.experiments.framework.errors import InputError
-from vslam_ref.experiments.framework.results import to_json
+from vslam_ref.arrays import Array
 from vslam_ref.experiments.slam_log.compare import Comparison
 from vslam_ref.geometry import se2, so2
 from vslam_ref.plot.saving import save_figure
 from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
+from vslam_ref.support import files
+from vslam_ref.support.errors import InputError
+from vslam_ref.support.json_text import to_json
 from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
 from vslam_ref.systems.slam_log.evaluate import reference_point
-
-Array = NDArray[np.float64]
 
 TRAJECTORY = "time_s,x_m,y_m,theta_rad,sd_x_m,sd_y_m,sd_theta_rad"
 MAP = "id,x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2"

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Loss, TukeyAsPrinted, tuned
 from vslam_ref.geometry import se2
-
-Array = NDArray[np.float64]
 
 COSTS = ("printed", "corrected", "huber", "l2")
 FAR = 4.0

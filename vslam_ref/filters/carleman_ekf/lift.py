@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 MONOMIALS = ("1", "u1", "u2", "u3", "u2u2", "u2u3", "u3u3", "u1u2", "u1u3")
 VEHICLE = 11

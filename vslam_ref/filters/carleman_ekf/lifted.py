@@ -15,14 +15,12 @@ matrices.  The vehicle block is kept current at every step.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters.carleman_ekf import lift, moments
 from vslam_ref.filters.estimates import Innovation, MapEstimate, PoseEstimate, as_batch, checked_measurement
 from vslam_ref.filters.vehicle import Increment
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _R = slice(0, lift.VEHICLE)
 _L = slice(lift.VEHICLE, None)

@@ -24,10 +24,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters.carleman_ekf import lift
 from vslam_ref.filters.vehicle import Increment
-
-Array = NDArray[np.float64]
 
 Term = tuple[complex, int, int, int]
 """Coefficient and the exponents p, q, k of x^p y^q e^{ik theta}."""

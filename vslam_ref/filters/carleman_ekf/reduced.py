@@ -25,8 +25,9 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters.block_covariance import Blocks
 from vslam_ref.filters.carleman_ekf.reduced_moments import control_gaussian, start_moments
 from vslam_ref.filters.carleman_ekf.reduced_step import (
@@ -46,10 +47,6 @@ from vslam_ref.filters.estimates import (
     room_for_innovation,
 )
 from vslam_ref.filters.vehicle import Increment
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 WAITING = 16
 """Increments put down before they are used at the latest."""

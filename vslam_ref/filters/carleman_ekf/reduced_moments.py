@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters.vehicle import Increment
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

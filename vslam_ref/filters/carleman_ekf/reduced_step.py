@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters.block_covariance import landmark_blocks, map_columns, move_means, whitened
 from vslam_ref.filters.carleman_ekf.reduced_moments import control_first_order
 from vslam_ref.filters.vehicle import Increment
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
 
 _I = np.array([-1j, 1j, 1j, 1j])
 """What a noise in Im m does to p, i conj(h), A and g, over what one in Re m does."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.geometry.cameras.interface import Array, IntArray
+from vslam_ref.arrays import Array, IntArray
 
 
 class Batch(NamedTuple):

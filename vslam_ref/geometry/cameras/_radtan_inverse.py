@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry.cameras._batches import of
 from vslam_ref.geometry.cameras._radtan_terms import coefficients, plane_jacobian, radial, tangential
 from vslam_ref.geometry.cameras._roots import solve_increasing
-from vslam_ref.geometry.cameras.interface import Array, BoolArray, IntArray
 
 ITERATIONS = 100
 ROUNDINGS = 32

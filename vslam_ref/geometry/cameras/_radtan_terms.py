@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras._roots import first_of, first_positive_root
-from vslam_ref.geometry.cameras.interface import MAX_TAN, Array
+from vslam_ref.geometry.cameras.interface import MAX_TAN
 
 
 class Radial(NamedTuple):

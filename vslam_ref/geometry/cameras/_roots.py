@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
+
 IntArray = NDArray[np.intp]
 EPS = float(np.finfo(np.float64).eps)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
 
 ARCTAN_SERIES = 0.1
 """Below this q the series of :func:`arctan_ratio` is used.

@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import projection
 from vslam_ref.geometry.cameras.interface import (
-    Array,
     Lens,
     Projection,
     ProjectionJacobians,

@@ -18,20 +18,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry.cameras._batches import flatten, of
 from vslam_ref.geometry.cameras._roots import first_of, first_positive_root, solve_increasing
 from vslam_ref.geometry.cameras._series import ARCTAN_SERIES, arctan_ratio
 from vslam_ref.geometry.cameras.camera import Camera
-from vslam_ref.geometry.cameras.interface import (
-    Array,
-    BoolArray,
-    Distorted,
-    DistortedJacobians,
-    IntArray,
-    Lens,
-    Rays,
-    as_points,
-)
+from vslam_ref.geometry.cameras.interface import Distorted, DistortedJacobians, Lens, Rays, as_points
 
 LARGEST_ANGLE = np.pi - 1e-6
 """Straight behind the camera every direction of the image is the same point."""

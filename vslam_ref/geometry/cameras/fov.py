@@ -18,12 +18,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.geometry.cameras._series import arctan_ratio, tan_ratio, tan_ratio_slope
 from vslam_ref.geometry.cameras.camera import Camera
 from vslam_ref.geometry.cameras.interface import (
     MAX_TAN,
-    Array,
-    BoolArray,
     Distorted,
     DistortedJacobians,
     Lens,

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.geometry.cameras.camera import Camera
-from vslam_ref.geometry.cameras.interface import Array, BoolArray, as_points
+from vslam_ref.geometry.cameras.interface import as_points
 
 
 class ImageMap(NamedTuple):

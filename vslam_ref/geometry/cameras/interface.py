@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from vslam_ref.arrays import Array, BoolArray
+
 IntArray = NDArray[np.intp]
 
 MAX_TAN = 1e6

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import BoolArray
 from vslam_ref.geometry.cameras.camera import Camera
 from vslam_ref.geometry.cameras.interface import (
     MAX_TAN,
-    BoolArray,
     Distorted,
     DistortedJacobians,
     Lens,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras.interface import (
-    Array,
     Lens,
     Projection,
     ProjectionJacobians,

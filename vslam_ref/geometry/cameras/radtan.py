@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.geometry.cameras._batches import flatten, of
 from vslam_ref.geometry.cameras._radtan_inverse import may_have_a_ray, newton, radial_start
 from vslam_ref.geometry.cameras._radtan_terms import (
@@ -29,8 +30,6 @@ from vslam_ref.geometry.cameras._radtan_terms import (
 )
 from vslam_ref.geometry.cameras.camera import Camera
 from vslam_ref.geometry.cameras.interface import (
-    Array,
-    BoolArray,
     Distorted,
     DistortedJacobians,
     Lens,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.geometry._arrays import Array
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.multiview.views import Views
 
 SETTLED = 1e-16

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.geometry._arrays import Array
+from vslam_ref.arrays import Array
 
 
 def across(bearings: Array) -> Array:

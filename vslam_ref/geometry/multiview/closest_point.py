@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.geometry._arrays import Array, as_array, times
+from vslam_ref.arrays import Array, as_array, times
 
 
 class Midpoint(NamedTuple):

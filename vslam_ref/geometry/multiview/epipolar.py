@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array, times, transpose
 from vslam_ref.geometry import se3, so3
-from vslam_ref.geometry._arrays import Array, as_array, times, transpose
 
 
 def relative_motion(T_a_world: ArrayLike, T_b_world: ArrayLike) -> Array:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 StateArray = NDArray[np.int8]
-BoolArray = NDArray[np.bool_]
 
 
 class PointState(IntEnum):

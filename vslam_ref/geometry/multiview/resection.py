@@ -26,8 +26,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry import se3
-from vslam_ref.geometry._arrays import Array, as_array
 from vslam_ref.geometry.multiview._rays import across
 from vslam_ref.geometry.multiview.three_points import p3p
 from vslam_ref.geometry.nearest import nearest_rotation

@@ -40,8 +40,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array, as_array, times, transpose
 from vslam_ref.geometry import se3
-from vslam_ref.geometry._arrays import Array, as_array, times, transpose
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 ROUNDING = 1e-10

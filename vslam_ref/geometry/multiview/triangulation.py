@@ -23,11 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array, BoolArray, as_array, times
 from vslam_ref.geometry import camera_pose, se3
-from vslam_ref.geometry._arrays import Array, as_array, times
 from vslam_ref.geometry.multiview._descent import descend
 from vslam_ref.geometry.multiview._rays import across, largest_angle
-from vslam_ref.geometry.multiview.point_state import BoolArray, PointState, StateArray
+from vslam_ref.geometry.multiview.point_state import PointState, StateArray
 from vslam_ref.geometry.multiview.views import Views
 
 MIN_PARALLAX = float(np.radians(1.0))

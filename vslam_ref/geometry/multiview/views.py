@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry import camera_pose, se3
-from vslam_ref.geometry._arrays import Array, as_array
 from vslam_ref.geometry.cameras import Camera, Projection, Rays, WorldProjectionJacobians
 
 

@@ -10,10 +10,10 @@ module                holds
 ``field``             distances to what is static, with slopes
 ``matching``          a scan against a map: correlative search, then Gauss-Newton
 ``pose_update``       a match given to a filter that also holds landmarks
-``slam``              the whole loop: pose, S, D and landmarks
 ====================  ==============================================================================
 
-The filter is :class:`vslam_ref.filters.ekf_slam.EkfSlam`; innovation = measured - predicted.
+The whole loop of pose, S, D and landmarks is :mod:`vslam_ref.systems.grid_slam`; its filter is
+:class:`vslam_ref.filters.ekf_slam.EkfSlam`.  innovation = measured - predicted.
 """
 
 from vslam_ref.grids.landmarks.association import Association, Signature, associate, gate, look_alike
@@ -22,15 +22,12 @@ from vslam_ref.grids.landmarks.landmark_map import Landmark, LandmarkConfig, Lan
 from vslam_ref.grids.landmarks.lines import CornerConfig, Corners, cross, scan_corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, MapCorners, map_corners, static_along_arms
 from vslam_ref.grids.landmarks.matching import Match, MatchConfig, correlative, match_scan, thin
-from vslam_ref.grids.landmarks.slam import GridSlam, GridSlamConfig, Step
 
 __all__ = [
     "Association",
     "CornerConfig",
     "Corners",
     "DistanceField",
-    "GridSlam",
-    "GridSlamConfig",
     "Landmark",
     "LandmarkConfig",
     "LandmarkMap",
@@ -39,7 +36,6 @@ __all__ = [
     "Match",
     "MatchConfig",
     "Signature",
-    "Step",
     "associate",
     "correlative",
     "cross",

@@ -14,13 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import so2
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 GATE = 9.210340371976184
 """99 % quantile of chi^2 with two degrees of freedom, -2 ln 0.01."""

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

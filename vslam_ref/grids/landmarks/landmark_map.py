@@ -16,17 +16,15 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.association import TURN, Signature, look_alike
 from vslam_ref.grids.landmarks.lines import Corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, map_corners, static_along_arms
 from vslam_ref.grids.log_odds import LogOddsGrid
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 Why = Literal["", "seen through", "no longer static in S"]
 
 

@@ -15,11 +15,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.grids.log_odds import LogOddsGrid
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Tukey
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.field import (
@@ -25,7 +26,6 @@ from vslam_ref.grids.landmarks.field import (
     scan_residuals_with_jacobians,
 )
 
-Array = NDArray[np.float64]
 FINE = 1e-4
 """Steps below this (m, rad) end the refinement: a hundredth of what the map resolves."""
 SHARES = (1.0, 0.5, 0.25, 0.125)

@@ -8,12 +8,11 @@ The landmarks move with the pose through their cross covariances, as in any EKF 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters.block_covariance import Blocks, move_means, whitened
 from vslam_ref.geometry import so2
-
-Array = NDArray[np.float64]
 
 WEAKEST = 1e-6
 """Eigenvalues below this share of the largest say nothing."""

@@ -24,9 +24,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vslam_ref.arrays import Array
+
 Statistic = Callable[[Array], Array]
 """Maps mean curves (S, T) to one number (or truth value) per curve, (S,)."""
 

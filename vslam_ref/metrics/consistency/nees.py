@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
-
-Array = NDArray[np.float64]
 
 EPS = float(np.finfo(np.float64).eps)
 

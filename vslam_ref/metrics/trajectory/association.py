@@ -11,10 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from vslam_ref.arrays import Array, IntArray
 
 MAX_DIFFERENCE = 0.01
 """Seconds.  Half the interval of 50 Hz; a hand-held camera at 0.5 m/s moves 5 mm in it."""

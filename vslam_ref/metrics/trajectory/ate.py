@@ -14,13 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import so3
 from vslam_ref.geometry.alignment import Alignment, align
 from vslam_ref.metrics.trajectory.poses import Summary, Trajectory, summary
-
-Array = NDArray[np.float64]
 
 MODES = ("none", "se3", "sim3")
 LEAST_PAIRS = 3

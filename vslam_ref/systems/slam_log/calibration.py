@@ -1,6 +1,6 @@
 """What has to be known about a vehicle and its sensor before a filter can run: gains, delays, noises.
 
-All of it can be found without any truth (see ``vslam_ref.experiments.slam_log.identify``).
+All of it can be found without any truth (see ``vslam_ref.systems.slam_log.identify``).
 """
 
 from __future__ import annotations
@@ -10,11 +10,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import range_bearing
-
-Array = NDArray[np.float64]
 
 
 def _value(default: float, unit: str, what: str) -> float:

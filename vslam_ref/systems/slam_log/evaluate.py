@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
 from vslam_ref.metrics.alignment import align_rigid, root_mean_square
 from vslam_ref.systems.slam_log.log import Truth
 from vslam_ref.systems.slam_log.runner import LogRun
-
-Array = NDArray[np.float64]
 
 KEYS = (
     "rmse_position_m",

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import MapEstimate, SlamFilter
@@ -27,9 +28,6 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.systems.slam_log.calibration import Calibration
 from vslam_ref.systems.slam_log.log import SlamLog
 from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 Build = Callable[[Array, Array, int], SlamFilter]
 

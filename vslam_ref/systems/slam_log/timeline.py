@@ -15,14 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import vehicle
 from vslam_ref.systems.slam_log.calibration import Calibration
 from vslam_ref.systems.slam_log.log import SlamLog
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Timeline(NamedTuple):

@@ -12,15 +12,11 @@ a wall are pushed out, and a move through a wall is taken back.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.worlds.floor_plan.config import CrowdConfig
 from vslam_ref.worlds.floor_plan.plan import FloorPlan
 from vslam_ref.worlds.floor_plan.rays import CORNER
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 ARRIVED = 0.35
 """Metres from a goal at which it counts as reached."""

@@ -18,12 +18,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class Schedule(NamedTuple):

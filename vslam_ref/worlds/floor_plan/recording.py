@@ -7,18 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import se2, so2
 from vslam_ref.worlds.floor_plan.config import FloorPlanConfig
 from vslam_ref.worlds.floor_plan.crowd import Crowd, nearest_on_segments
 from vslam_ref.worlds.floor_plan.plan import PLANS, Box, FloorPlan, Schedule, schedule
 from vslam_ref.worlds.floor_plan.rays import cast
 from vslam_ref.worlds.floor_plan.robot import Odometry, drive, measure, true_increments
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 FIXED = 0
 """Number of the object that never moves: walls and furniture together."""

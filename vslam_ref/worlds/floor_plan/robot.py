@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.filters import vehicle
 from vslam_ref.geometry import so2
 from vslam_ref.worlds.floor_plan.config import RobotConfig
-
-Array = NDArray[np.float64]
 
 
 class Odometry(NamedTuple):

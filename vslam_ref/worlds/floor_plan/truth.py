@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vslam_ref.arrays import BoolArray
 from vslam_ref.geometry import so2
 from vslam_ref.worlds.floor_plan.cells import Cells, cells_on_segments, disc_cells, segment_cells
 from vslam_ref.worlds.floor_plan.recording import Recording
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class CellTruth(NamedTuple):

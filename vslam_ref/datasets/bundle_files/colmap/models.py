@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from vslam_ref.datasets.text import Array
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera, Fisheye, Fov, Pinhole, Radtan, Rational
 
 SENSOR = ("fx", "fy", "cx", "cy")

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.colmap.models import HALF, PARAMETERS, common_model, params_from_colmap
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, UNIT_TOLERANCE, load, require_once
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import Array, FormatError, IntArray, number
+from vslam_ref.datasets.text import FormatError, number
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations, Scene
 from vslam_ref.geometry import quaternion, se3
 from vslam_ref.geometry.cameras import Camera

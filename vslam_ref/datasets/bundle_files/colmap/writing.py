@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.colmap.models import HALF, params_to_colmap
 from vslam_ref.datasets.bundle_files.colmap.reading import FILES
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import Array, IntArray
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry import quaternion
 from vslam_ref.geometry.cameras import projection

@@ -1,0 +1,228 @@
+"""Rotations of space: the exponential by its power series, everything else from it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from scipy.stats import norm
+
+from generator.building import Topic, tolerance
+from generator.exact import column, expm, floats, hat, matrix, vector
+from vslam_ref.arrays import Array
+
+TOPIC, CHAPTER = "so3", 2
+SERIES = "power series of the matrix exponential, 50 digits"
+ROUNDING = "a few dozen operations on numbers of order 1, each within eps"
+NEAR_POLE = "the inverse has a pole at 2 pi: its condition times eps"
+
+NOTES = {
+    "transposed": (
+        "your rotation is the transpose of the right one: the angle's sign, or the other frame",
+        "I - sin(a)/a hat(phi) + (1 - cos(a))/a^2 hat(phi)^2",
+    ),
+    "right-jacobian": (
+        "your left Jacobian is the right one",
+        "I - (1 - cos(a))/a^2 hat(phi) + (a - sin(a))/a^3 hat(phi)^2",
+    ),
+    "small-angle-sign": (
+        "your branch for small angles has the sign of the right Jacobian: I - hat(phi)/2 for I + hat(phi)/2",
+        "I - hat(phi)/2",
+    ),
+    "uniform-angles": (
+        "your rotations are not uniform: a uniform angle about a uniform axis has E tr R = 1, E (tr R)^2 = 3",
+        "R = Exp(a n) with a uniform in (0, 2 pi)",
+    ),
+}
+
+REGIMES: dict[str, tuple[float, float]] = {
+    "small_angle": (1e-12, 1e-3),
+    "generic": (0.1, 3.0),
+    "near_pi": (np.pi - 1e-3, np.pi - 1e-9),
+    "beyond_pi": (3.3, 6.0),
+}
+"""Flag -> range of the angle, log-uniform."""
+
+
+def build(rng: np.random.Generator) -> Topic:
+    """All groups of rotations."""
+    topic = Topic(CHAPTER, TOPIC)
+    for identity, (meaning, formula) in NOTES.items():
+        topic.note(identity, meaning, formula)
+    for flag, (low, high) in REGIMES.items():
+        _regime(topic, flag, [_phi(rng, low, high) for _ in range(12)])
+    _ends(topic)
+    near = tolerance(1e-13, "a logarithm and an exponential")
+    topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, [_between(rng) for _ in range(15)])
+    rule = tolerance(1e-13, "condition of the polar factor, below 50, times eps", float32=1e-4)
+    oracle = "polar factor by Newton's iteration, 50 digits"
+    topic.group("so3.nearest", "eq-log-rotation", oracle, rule, [_nearest(rng) for _ in range(15)])
+    _random(topic)
+    return topic
+
+
+def _regime(topic: Topic, flag: str, phis: list[Array]) -> None:
+    """Exponential, Jacobians and logarithm at some rotation vectors."""
+    flags = () if flag == "generic" else (flag,)
+    fine, pole = tolerance(2e-14, ROUNDING), tolerance(1e-13, NEAR_POLE, float32=1e-3)
+    topic.group("so3.exp", "eq-rodrigues", SERIES, fine, [_exp(p) for p in phis], flags=flags)
+    cases = [_jacobian(p, flag) for p in phis]
+    topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", fine, cases, flags=flags)
+    oracle = "exact inverse of the left Jacobian"
+    cases = [_inverse(p) for p in phis]
+    topic.group("so3.left_jacobian_inverse", "eq-v-inverse", oracle, pole, cases, flags=flags)
+    if flag != "beyond_pi":
+        cases = [_log(p) for p in phis]
+        oracle = "Newton's iteration on the series, 50 digits"
+        topic.group("so3.log", "eq-log-rotation", oracle, _log_tolerance(flag), cases, flags=flags)
+
+
+def _ends(topic: Topic) -> None:
+    """The identity, exactly, and half turns, where both ends of the axis are right."""
+    zero, exact = np.zeros(3), tolerance(0.0, "exact", absolute=1e-300)
+    topic.group("so3.exp", "eq-rodrigues", "definition", exact, [_exp(zero)], flags=("zero",))
+    topic.group("so3.log", "eq-log-rotation", "definition", exact, [_log(zero)], flags=("zero",))
+    axes = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [1.0, 2.0, -2.0]])
+    cases = [_half_turn(np.pi * axis / np.linalg.norm(axis)) for axis in axes]
+    reason = "R is rounded: near pi a rounding of eps can move the angle by its root, never the axis"
+    rule = tolerance(3e-8, reason, float32=2e-3)
+    topic.group("so3.log", "eq-log-rotation", "definition", rule, cases, flags=("pi",))
+
+
+def _phi(rng: np.random.Generator, low: float, high: float) -> Array:
+    axis = rng.standard_normal(3)
+    angle = np.exp(rng.uniform(np.log(low), np.log(high)))
+    return np.asarray(angle * axis / np.linalg.norm(axis))
+
+
+def _exp(phi: Array) -> dict[str, Any]:
+    R = expm(hat(vector(phi)))
+    case = {"inputs": {"phi": phi}, "expected": {"R": floats(R)}}
+    if np.linalg.norm(phi) > 1e-6 and abs(np.linalg.norm(phi) - np.pi) > 1e-2:
+        case["mistakes"] = {"transposed": {"R": floats(R.T)}}
+    return case
+
+
+def left_jacobian(phi: list[Any]) -> Any:
+    """Sum of hat(phi)^k / (k + 1)!: the integral of the exponential from 0 to 1."""
+    big = mpmath.zeros(6, 6)
+    H = hat(phi)
+    for i in range(3):
+        for j in range(3):
+            big[i, j] = H[i, j]
+        big[i, 3 + i] = mpf(1)
+    full = expm(big)  # the upper right block of the exponential of [[H, I], [0, 0]] is that integral
+    return full[0:3, 3:6]
+
+
+def _jacobian(phi: Array, flag: str) -> dict[str, Any]:
+    x = vector(phi)
+    J = left_jacobian(x)
+    mistakes = {"right-jacobian": {"J": floats(J.T)}}
+    if flag == "small_angle":
+        # told apart from the right answer down to a thousand tolerances
+        wrong = {"small-angle-sign": {"J": floats(mpmath.eye(3) - hat(x) / 2)}}
+        mistakes = wrong if np.linalg.norm(phi) > 1e-11 else {}
+    return {"inputs": {"phi": phi}, "expected": {"J": floats(J)}, "mistakes": mistakes}
+
+
+def _inverse(phi: Array) -> dict[str, Any]:
+    return {"inputs": {"phi": phi}, "expected": {"J": floats(left_jacobian(vector(phi)) ** -1)}}
+
+
+def _log_tolerance(flag: str) -> dict[str, Any]:
+    if flag == "near_pi":
+        reason = "the entries of R are rounded to eps; a program through the quaternion keeps all digits"
+        return tolerance(1e-14, reason, float32=2e-3)
+    if flag == "small_angle":
+        return tolerance(1e-14, "the off-diagonal entries carry the angle", absolute=2.3e-16, float32=1e-4)
+    return tolerance(1e-14, ROUNDING)
+
+
+def _log(phi: Array) -> dict[str, Any]:
+    """The logarithm of the *rounded* matrix: Newton's iteration from phi, on what the program is given."""
+    R = np.array(floats(expm(hat(vector(phi)))))
+    return {"inputs": {"R": R}, "expected": {"phi": floats(log_of(R, phi))}}
+
+
+def log_of(R: Array, start: Array) -> list[Any]:
+    """Rotation vector whose exponential is the rotation nearest to R, in 50 digits."""
+    target = polar(matrix(R))
+    x = vector(start)
+    for _ in range(6):
+        E = target * expm(hat(x)).T
+        small = [(E[2, 1] - E[1, 2]) / 2, (E[0, 2] - E[2, 0]) / 2, (E[1, 0] - E[0, 1]) / 2]
+        step = left_jacobian(x) ** -1 * mpmath.matrix(small)
+        x = [a + b for a, b in zip(x, column(step), strict=True)]
+    assert mpmath.mnorm(expm(hat(x)) - target, 1) < mpf(10) ** -40
+    return x
+
+
+def polar(M: Any) -> Any:
+    """Orthogonal polar factor by Newton's iteration X <- (X + X^-T)/2."""
+    X = M
+    for _ in range(100):
+        Y = (X + (X**-1).T) / 2
+        if mpmath.mnorm(Y - X, 1) < mpf(10) ** -45:
+            return Y
+        X = Y
+    raise ArithmeticError("the iteration for the polar factor does not end")
+
+
+def _half_turn(phi: Array) -> dict[str, Any]:
+    axis = phi / np.linalg.norm(phi)
+    R = 2 * np.outer(axis, axis) - np.eye(3)
+    return {"inputs": {"R": R}, "expected": {"phi": phi}, "accept": [{"phi": -phi}]}
+
+
+def _between(rng: np.random.Generator) -> dict[str, Any]:
+    a, phi = _phi(rng, 0.2, 3.0), _phi(rng, 0.1, 2.9)
+    fraction = float(rng.uniform(0.05, 0.95))
+    A = expm(hat(vector(a)))
+    Ra, Rb = np.array(floats(A)), np.array(floats(A * expm(hat(vector(phi)))))
+    step = log_of(np.array(floats(matrix(Ra).T * matrix(Rb))), phi)
+    R = polar(matrix(Ra)) * expm(hat([mpf(fraction) * s for s in step]))
+    return {"inputs": {"a": Ra, "b": Rb, "fraction": fraction}, "expected": {"R": floats(R)}}
+
+
+def _nearest(rng: np.random.Generator) -> dict[str, Any]:
+    R = expm(hat(vector(_phi(rng, 0.2, 3.0))))
+    M = np.array(floats(R)) @ (np.diag(rng.uniform(0.5, 2.0, 3)) + 0.05 * rng.standard_normal((3, 3)))
+    return {"inputs": {"M": M}, "expected": {"R": floats(polar(matrix(M)))}}
+
+
+def _random(topic: Topic) -> None:
+    """Uniform rotations: characters have E chi = 0, E chi^2 = 1, E chi^4 = 3, so Var chi^2 = 2."""
+    samples, false_alarm = 2000, 1e-4
+    z = float(norm.isf(false_alarm / 2)) / samples**0.5
+    bands = {
+        "mean_trace": (-z, z, false_alarm),
+        "mean_squared_trace": (1.0 - z * 2.0**0.5, 1.0 + z * 2.0**0.5, false_alarm),
+        "worst_orthogonality": (0.0, 1e-12, 0.0),
+    }
+    # tr R = 1 + 2 cos a with a uniform: mean 1, variance 2; its square: mean 3, variance 10, taken as 16
+    uneven = {
+        "mean_trace": {"low": 1.0 - z * 2.0**0.5, "high": 1.0 + z * 2.0**0.5},
+        "mean_squared_trace": {"low": 3.0 - 4.0 * z, "high": 3.0 + 4.0 * z},
+    }
+    for measure, (low, high, rate) in bands.items():
+        rule: dict[str, Any] = {
+            **{"output": "R", "measure": measure, "samples": samples},
+            **{"low": low, "high": high, "false_alarm": rate},
+        }
+        if measure in uneven:
+            rule["mistakes"] = {"uniform-angles": uneven[measure]}
+        case = {"inputs": {"N": samples}, "expected": {"R": []}}
+        oracle = "characters of SO(3)"
+        flags = ("statistical", measure)
+        topic.group(
+            "so3.random",
+            "eq-rodrigues",
+            oracle,
+            tolerance(0.0, "a band"),
+            [case],
+            flags=flags,
+            statistic=rule,
+        )

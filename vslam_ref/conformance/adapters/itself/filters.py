@@ -1,0 +1,197 @@
+"""Chapters 15 and 16: vehicle models and filters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+import numpy as np
+
+from vslam_ref.arrays import Array
+from vslam_ref.conformance.adapters.table import Answers
+from vslam_ref.filters import observation, vehicle
+from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, ReducedCarlemanEkf, carleman_ekf, lift, moments
+from vslam_ref.filters.carleman_ekf.reduced_moments import start_moments
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
+from vslam_ref.filters.estimates import SlamFilter
+from vslam_ref.filters.range_bearing import cartesian_from_polar
+
+Slam = TypeVar("Slam", bound=SlamFilter)
+Steps = list[dict[str, Array]]
+
+
+# -- chapter 15 ------------------------------------------------------------------------------------
+
+
+def _slam(x: Array, P: Array) -> EkfSlam:
+    """The filter in the middle of a run."""
+    slam = EkfSlam(x[:3], P[:3, :3])
+    n = (len(x) - 3) // 2
+    slam.blocks.append(np.arange(n), x[None, 3:], P[None, 3:, 3:], P[None, :3, 3:], np.zeros((1, 0, 2 * n)))
+    return slam
+
+
+def _state(slam: EkfSlam) -> dict[str, Array]:
+    x, P = slam.blocks.full()
+    return {"x": x[0], "P": P[0]}
+
+
+def _predict(
+    x: Array, P: Array, control: Array, cov_u: Array, wheelbase: float, dt: float
+) -> dict[str, Array]:
+    slam = _slam(x, P)
+    slam.predict(vehicle.ackermann_increment(control[None], cov_u, wheelbase, dt))
+    return _state(slam)
+
+
+def _update(x: Array, P: Array, ids: Array, z: Array, cov_z: Array) -> dict[str, Array]:
+    slam = _slam(x, P)
+    slam.update(ids.astype(int), z[None], cov_z)
+    return _state(slam)
+
+
+def _augment(x: Array, P: Array, z: Array, cov_z: Array) -> dict[str, Array]:
+    slam = _slam(x, P)
+    slam.update([len(x)], z[None, None], cov_z)  # no landmark of the map has this number
+    return _state(slam)
+
+
+def _from_polar(polar: Array, sigma_range: float, sigma_bearing: float) -> dict[str, Array]:
+    z, cov = cartesian_from_polar(polar, sigma_range, sigma_bearing)
+    return {"z": z, "cov": cov}
+
+
+def _drive(slam: Slam, controls: Array, sightings: Any, cov_z: Array, **drive: Any) -> Iterator[Slam]:
+    """Feed a filter; yield after every step."""
+    for control, seen in zip(controls, sightings, strict=True):
+        slam.predict(vehicle.ackermann_increment(control[None], **drive))
+        if seen["ids"]:  # without a call predictions are put together, as they are in use
+            slam.update(seen["ids"], np.reshape(seen["z"], (1, -1, 2)), cov_z)
+        yield slam
+
+
+def _trace(x: Array, P: Array, **run: Any) -> Steps:
+    return [_state(slam) for slam in _drive(EkfSlam(x, P), **run)]
+
+
+# -- chapter 16 ------------------------------------------------------------------------------------
+
+
+def _lifted(Z: Array, P: Array, control: str = "first_order") -> LiftedCarlemanEkf:
+    """The lifted filter in the middle of a run."""
+    n = (len(Z) - lift.VEHICLE) // lift.LANDMARK
+    slam = LiftedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=n, control=control)
+    slam._z, slam._P = Z[None].copy(), P[None].copy()
+    slam._slots = {i: i for i in range(n)}
+    return slam
+
+
+def _lifted_state(slam: LiftedCarlemanEkf) -> dict[str, Array]:
+    Z, P = slam.state()
+    return {"Z": Z[0], "P": P[0]}
+
+
+def _increment(increment: Array, cov: Array) -> vehicle.Increment:
+    return vehicle.Increment(increment[None, 0], increment[None, 1], cov[None])
+
+
+def _lift(x: Array, P: Array) -> dict[str, Array]:
+    Z, P_Z = moments.lifted_start(x[None], P[None], "first_order")
+    return {"Z": Z[0], "P_Z": P_Z[0]}
+
+
+def _lifted_predict(
+    Z: Array, P: Array, increment: Array, cov: Array, control: str = "first_order"
+) -> dict[str, Array]:
+    slam = _lifted(Z, P, control)
+    slam.predict(_increment(increment, cov))
+    return _lifted_state(slam)
+
+
+def _lifted_update(Z: Array, P: Array, ids: Array, z: Array, cov_z: Array) -> dict[str, Array]:
+    slam = _lifted(Z, P)
+    slam.update(ids.astype(int), z[None], cov_z)
+    return _lifted_state(slam)
+
+
+def _lifted_augment(Z: Array, P: Array, z: Array, cov_z: Array) -> dict[str, Array]:
+    slam = _lifted(Z, P)
+    slam.update([len(Z)], z[None, None], cov_z)
+    return _lifted_state(slam)
+
+
+def _pose(z: Array, P: Array) -> dict[str, Array]:
+    Z, P_Z = np.zeros(lift.VEHICLE), np.zeros((lift.VEHICLE, lift.VEHICLE))
+    Z[:4], P_Z[:4, :4] = z, P
+    mean, cov = _lifted(Z, P_Z).pose()
+    return {"x": mean[0], "P": cov[0]}
+
+
+def _reduced_predict(
+    m: Array, P: Array, increment: Array, cov: Array, control: str = "first_order"
+) -> dict[str, Array]:
+    """Landmarks are r = c rho - tau inside: rho is r at the start, and is turned back at the end."""
+    n = (len(m) - 4) // 2
+    slam = ReducedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=max(n, 1), control=control)
+    slam._blocks.x_p[:], slam._blocks.P_pp[:] = m[:4], P[:4, :4]
+    slam._blocks.append(np.arange(n), m[None, 4:], P[None, 4:, 4:], P[None, :4, 4:], np.zeros((1, 0, 2 * n)))
+    slam.predict(_increment(increment, cov))
+    slam._apply()
+    (c, tau), (mean, full) = slam._frame[0, :2], slam.blocks.full()
+    turn = np.eye(len(m))
+    for at in range(4, len(m), 2):
+        turn[at : at + 2, at : at + 2] = [[c.real, -c.imag], [c.imag, c.real]]
+    after = turn @ mean[0]
+    after[4::2], after[5::2] = after[4::2] - tau.real, after[5::2] - tau.imag
+    return {"m": after, "P": turn @ full[0] @ turn.T}
+
+
+def _ideal(x: Array, P: Array, truth: Array, landmarks: Array, **run: Any) -> Steps:
+    return _pose_steps(EkfSlam(x, P, truth=Truth(truth, landmarks)), **run)
+
+
+def _pose_steps(slam: SlamFilter, **run: Any) -> Steps:
+    poses = [step.pose() for step in _drive(slam, **run)]
+    return [{"x": pose.mean[0], "P": pose.cov[0]} for pose in poses]
+
+
+def _lift_gaussian(x: Array, P: Array) -> dict[str, Array]:
+    Z, P_Z = moments.lifted_start(x[None], P[None], "gaussian")
+    return {"Z": Z[0], "P_Z": P_Z[0]}
+
+
+def _reduced_start(x: Array, P: Array) -> dict[str, Array]:
+    m, P_m = start_moments(x[None], P[None], "gaussian")
+    return {"m": m[0], "P": P_m[0]}
+
+
+TABLE: Answers = {
+    "vehicle.relative": lambda x, landmark: observation.vehicle_from_world(x, landmark),
+    "vehicle.place": lambda x, z: observation.world_from_vehicle(x, z),
+    "ekf.ideal_trace": _ideal,
+    "lift.landmark": lambda x, landmark: lift.lift_landmark(x, landmark),
+    "lift.gaussian": _lift_gaussian,
+    "lift.gaussian_predict": lambda **inputs: _lifted_predict(control="gaussian", **inputs),
+    "reduced.start": _reduced_start,
+    "reduced.gaussian_predict": lambda **inputs: _reduced_predict(control="gaussian", **inputs),
+    "consistency.anchored_trace": lambda x, P, **run: _pose_steps(AnchoredEkf(x, P), **run),
+    "vehicle.ackermann": lambda x, control, wheelbase, track, dt: vehicle.propagate(
+        x, vehicle.ackermann(control, wheelbase, dt)
+    ),
+    "vehicle.front_wheel": lambda x, control, wheelbase, dt: vehicle.front_wheel_step(
+        x, control, wheelbase, dt
+    ),
+    "ekf.predict": _predict,
+    "ekf.update": _update,
+    "ekf.augment": _augment,
+    "ekf.from_polar": _from_polar,
+    "ekf.trace": _trace,
+    "lift.vehicle": _lift,
+    "carleman.predict": _lifted_predict,
+    "carleman.update": _lifted_update,
+    "carleman.augment": _lifted_augment,
+    "lift.pose": _pose,
+    "reduced.predict": _reduced_predict,
+    "carleman.trace": lambda x, P, **run: _pose_steps(carleman_ekf(x, P, form="lifted"), **run),
+    "reduced.trace": lambda x, P, **run: _pose_steps(carleman_ekf(x, P, form="reduced"), **run),
+}

@@ -1,0 +1,12 @@
+"""What every room may use and no algorithm needs: files, settings, provenance, errors, report pages.
+
+==============  ==========================================================================
+module          holds
+==============  ==========================================================================
+``errors``      ``InputError``: bad input, reported in one line
+``files``       files and folders that appear whole or not at all
+``config``      ``key=value`` settings of frozen dataclasses, and their reasons
+``json_text``   values as JSON text
+``provenance``  versions, git commit, platform
+==============  ==========================================================================
+"""
