@@ -12,6 +12,7 @@ metadata of the machine that ran it, so that a second run gives the same bytes.
 from __future__ import annotations
 
 import argparse
+import ast
 import base64
 import io
 import os
@@ -33,6 +34,8 @@ METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
     "language_info": {"name": "python"},
 }
+INCLUDED = re.compile(r"^```\{literalinclude\} (\S+)\n((?::[\w-]+:.*\n)*)```$", re.MULTILINE)
+OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 KEPT_TYPES = ("image/png", "text/html", "text/latex", "text/markdown", "text/plain")
 LARGEST = 2_000_000  # bytes of one stored notebook
@@ -49,9 +52,39 @@ def from_page(page: Path) -> NotebookNode:
     notebook = jupytext.read(page, fmt="md:myst")
     for number, cell in enumerate(notebook.cells):
         cell["id"] = f"cell-{number:03d}"
+        if cell.cell_type == "markdown":
+            cell.source = INCLUDED.sub(lambda found: included(page, *found.groups()), cell.source)
     notebook.metadata = nbformat.from_dict(METADATA)
     notebook.nbformat, notebook.nbformat_minor = 4, 5
     return notebook
+
+
+def included(page: Path, name: str, options: str) -> str:
+    """Write a ``literalinclude`` as a block of code, since a notebook would show the directive raw.
+
+    Options ``language``, ``pyobject`` (a function or class at the top level), ``start-after`` and
+    ``end-before`` are understood, others refused.
+    """
+    path = (page.parent / name).resolve()
+    if not path.is_file():
+        raise ValueError(f"{page.name} includes {name}, which is no file")
+    text = path.read_text(encoding="utf-8")
+    given = dict(found.groups() for line in options.splitlines() if (found := OPTION.match(line)))
+    for option, value in given.items():
+        if option == "pyobject":
+            found_at = [n for n in ast.parse(text).body if getattr(n, "name", None) == value]
+            if not found_at:
+                raise ValueError(f"{page.name}: {name} defines no {value!r}")
+            node = found_at[0]
+            first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+            text = "\n".join(text.splitlines()[first - 1 : node.end_lineno])
+        elif option == "start-after":
+            text = text.split(value, 1)[1].partition("\n")[2]
+        elif option == "end-before":
+            text = text.split(value, 1)[0].rpartition("\n")[0]
+        elif option not in ("language", "caption"):
+            raise ValueError(f"{page.name}: option {option!r} of literalinclude is not understood here")
+    return f"```{given.get('language', 'python')}\n{text.strip()}\n```"
 
 
 def execute(notebook: NotebookNode, quick: bool) -> None:

@@ -91,3 +91,19 @@ def test_a_page_that_fails_is_reported(workshop, tmp_path: Path, capsys) -> None
     page.write_text(PAGE.replace("object()", "assert 1 + 1 == 3, 'the claim fails'"), encoding="utf-8")
     assert workshop.main(["--check", "--execute"]) == 1
     assert "the claim fails" in capsys.readouterr().err
+
+
+def test_a_notebook_shows_the_code_that_its_page_includes(workshop, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
+    """A changed file puts the notebook out of step, as a changed page does."""
+    page, code = tmp_path / "chapters" / "99_page.md", tmp_path / "book.py"
+    include = "\n```{literalinclude} ../book.py\n:language: python\n:pyobject: second\n```\n"
+    page.write_text(PAGE + include, encoding="utf-8")
+    assert workshop.main(["--write"]) == 1
+    assert "includes ../book.py, which is no file" in capsys.readouterr().err
+    code.write_text("first = 1\n\n\ndef second():\n    return 2\n", encoding="utf-8")
+    (cell,) = [c for c in workshop.from_page(page).cells if "second" in c.source]
+    assert cell.source.endswith("```python\ndef second():\n    return 2\n```")
+    assert workshop.main(["--write"]) == 0
+    assert workshop.main(["--check"]) == 0
+    code.write_text("def second():\n    return 3\n", encoding="utf-8")
+    assert workshop.main(["--check"]) == 1
