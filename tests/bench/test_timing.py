@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from vslam_ref.bench import filterpy_peer
-from vslam_ref.bench.ekf_world import World, array_step
+from vslam_ref.bench.ekf_steps import array_step
 from vslam_ref.bench.rows import row
-from vslam_ref.bench.timing import paired
+from vslam_ref.support.timing import paired
+from vslam_ref.worlds.mapped_vehicle import MappedVehicle
 
 
 def test_a_ratio_is_that_of_the_things_timed() -> None:
@@ -26,9 +27,9 @@ def test_a_ratio_is_that_of_the_things_timed() -> None:
 def test_the_peer_computes_what_we_compute() -> None:
     """The benchmark compares equal work: filterpy's stacked step and ours end in the same state."""
     pytest.importorskip("filterpy", reason="the peer is not installed")
-    world = World(10)
+    world = MappedVehicle(10)
     ours, theirs = array_step(world), filterpy_peer.filterpy_step(world, "stacked")
-    x_p, x_m, P_pp, P_pm, P_mm = _held(ours, "arrays")[:5]
+    x_p, x_m, P_pp, P_pm, P_mm = ours.args[:5]
     kalman = _held(_held(theirs, "predict"), "kalman")
     for _ in range(3):
         ours()
@@ -56,7 +57,7 @@ def test_the_users_peer_linearises_rightly(i: int) -> None:
 @pytest.mark.parametrize("way", filterpy_peer.WAYS)
 def test_every_way_of_the_peer_measures_five_landmarks(way: str) -> None:
     pytest.importorskip("filterpy", reason="the peer is not installed")
-    world = World(10)
+    world = MappedVehicle(10)
     step = filterpy_peer.filterpy_step(world, way)
     kalman = _held(_held(step, "predict"), "kalman")
     before = np.diag(kalman.P)[3:].reshape(-1, 2).sum(1)

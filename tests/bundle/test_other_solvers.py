@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from vslam_ref.bench.bundle import peers
-from vslam_ref.bench.bundle.problems import chain, cost
+from vslam_ref.bench.bundle import cost, peers
 from vslam_ref.estimation.bundle import BundleProblem, Options, bundle_adjust
 from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.geometry import se3
+from vslam_ref.worlds.view_chain import chain
 
 from .conftest import hold, make
 

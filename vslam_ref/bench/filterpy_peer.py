@@ -17,46 +17,42 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.bench.ekf_world import World
+from vslam_ref.filters.ekf_slam import EkfSlam
+from vslam_ref.worlds.mapped_vehicle import MappedVehicle
 
 WAYS = ("users", "one at a time", "stacked")
 
 
-def filterpy_step(world: World, way: str) -> Callable[[], object]:
+def filterpy_step(world: MappedVehicle, way: str) -> Callable[[], object]:
     """One prediction and five landmarks by filterpy, in one of the ``WAYS``."""
     from filterpy.kalman import ExtendedKalmanFilter
 
-    mean, cov = world.start_ekf().blocks.full()
+    mean, cov = world.start(EkfSlam).blocks.full()
     seen = world.seen.tolist()
     groups = [seen] if way == "stacked" else [[i] for i in seen]
-    kalman = ExtendedKalmanFilter(dim_x=mean.shape[1], dim_z=2 * len(groups[0]))
+    kalman: Any = ExtendedKalmanFilter(dim_x=mean.shape[1], dim_z=2 * len(groups[0]))
     kalman.x, kalman.P = mean[0].copy(), cov[0].copy()
     predict = _prediction(kalman, world)
-    update: Callable[..., None] = kalman.update
+    sights: list[tuple[Any, Array]]
+    models: dict[str, Callable[..., Array]]
     if way == "users":
+        models = {"HJacobian": range_bearing_jacobian, "Hx": range_bearing, "residual": polar_residual}
         kalman.R = np.diag([0.01, 0.001])
-        polar = [range_bearing(mean[0], i) for i in seen]
-
-        def step_polar() -> None:
-            predict()
-            for i, z in zip(seen, polar, strict=True):
-                models = {"HJacobian": range_bearing_jacobian, "Hx": range_bearing}
-                update(z, **models, args=(i,), hx_args=(i,), residual=polar_residual)
-
-        return step_polar
-
-    kalman.R = np.kron(np.eye(len(groups[0])), world.cov_z)
-    measured = [world.z[ids].ravel() for ids in groups]
+        sights = [(i, range_bearing(mean[0], i)) for i in seen]
+    else:
+        models = {"HJacobian": relative_jacobian, "Hx": relative}
+        kalman.R = np.kron(np.eye(len(groups[0])), world.cov_z)
+        sights = [(ids, world.z[ids].ravel()) for ids in groups]
 
     def step() -> None:
         predict()
-        for ids, z in zip(groups, measured, strict=True):
-            update(z, relative_jacobian, relative, args=(ids,), hx_args=(ids,))
+        for which, z in sights:
+            kalman.update(z, **models, args=(which,), hx_args=(which,))
 
     return step
 
 
-def _prediction(kalman: Any, world: World) -> Callable[[], None]:
+def _prediction(kalman: Any, world: MappedVehicle) -> Callable[[], None]:
     """Filterpy's prediction by the world's increment."""
     increment, d = world.increment(), len(kalman.x)
     ds, dalpha, cov = increment.ds[0], increment.dalpha[0], increment.cov[0]

@@ -5,7 +5,7 @@ goal  what is measured
 ===== =========================================================================================
 EKF-1 one step (a prediction and five known landmarks) against filterpy's ExtendedKalmanFilter
 EKF-2 a cycle of ten predictions and one update: the reduced IEKF against the EKF (the paper: 1.20)
-EKF-3 the whole study of figures 2-4: 50 runs, 2 filters, 2 P0, 1600 steps
+EKF-3 the runs of figures 2-4: 50 runs, 2 filters, 2 P0, 1600 steps
 EKF-4 growth of a step from 50 to 200 landmarks, as an exponent
 IM-1  ``import vslam_ref`` against ``import numpy``; first accelerated call with a warm cache
 ===== =========================================================================================
@@ -23,26 +23,24 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from vslam_ref import _kernels
-from vslam_ref.bench.ekf_world import World, array_step, class_step
+from vslam_ref.bench.ekf_steps import array_step, class_step
 from vslam_ref.bench.filterpy_peer import WAYS, filterpy_step
 from vslam_ref.bench.imports import imports
-from vslam_ref.bench.rows import row
-from vslam_ref.bench.timing import paired
-from vslam_ref.experiments.iekf.study import StudyConfig, run_study
+from vslam_ref.bench.rows import Row, each_backend, row
+from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import EkfSlam
 from vslam_ref.filters.estimates import SlamFilter
+from vslam_ref.support.timing import paired
+from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, MappedVehicle, cycle_ratios
+from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
 
 SIZES = (10, 20, 50, 100, 200)
-PAPER_POSE_RATIO = 23.05 / 19.26
-"""B, table 1: camera pose estimation, IEKF over EKF."""
+P0_LOW, P0_HIGH = (1.0, 1.0, 0.001), (1.0, 1.0, 0.03)
 GOALS_EKF_1 = {10: 2.0, 20: 2.0, 50: 6.0, 100: 20.0, 200: 30.0}
 GOAL_EKF_1_NUMBA = 50.0
 GOAL_EKF_2, GOAL_EKF_4 = 1.1, 2.1
@@ -56,22 +54,19 @@ GOALS_EKF_3 = {
 
 def run(quick: bool = False) -> dict[str, Any]:
     """Measure everything on one thread; ``rows`` is a list of flat records, one per figure."""
-    backends = [b for b in ("numpy", "numba") if b == "numpy" or importlib.util.find_spec("numba")]
-    rows: list[dict[str, Any]] = []
-    with threadpool_limits(1):
-        for backend in backends:
-            with _kernels.use_backend(backend):
-                rows += steps(backend, quick) + cycles(backend, quick) + study(backend, quick)
+    rows: list[Row] = []
+    for backend in each_backend():
+        rows += steps(backend, quick) + cycles(backend, quick) + study(backend, quick)
     rows += imports(quick)
     return {"rows": rows, "paper_pose_step_ratio": PAPER_POSE_RATIO, "threads": 1}
 
 
-def steps(backend: str, quick: bool) -> list[dict[str, Any]]:
+def steps(backend: str, quick: bool) -> list[Row]:
     """EKF-1 and EKF-4."""
     rows, seconds = [], {}
     ways = WAYS if importlib.util.find_spec("filterpy") else ()
     for n in SIZES:
-        world = World(n)
+        world = MappedVehicle(n)
         things = {"ours": array_step(world), "EkfSlam class": class_step(world)}
         things |= {f"filterpy, {way}": filterpy_step(world, way) for way in ways}
         result = paired(things, 3 if quick else 9)
@@ -83,38 +78,10 @@ def steps(backend: str, quick: bool) -> list[dict[str, Any]]:
             case = f"{name} / ours, n = {n}"
             rows.append(row("EKF-1", case, backend, result.ratio[name], "x", bound, below=False))
     growth = float(np.log(seconds[200] / seconds[50]) / np.log(4.0))
-    rows.append(row("EKF-4", "exponent of n, 50 to 200", backend, growth, "", GOAL_EKF_4))
-    return rows
+    return [*rows, row("EKF-4", "exponent of n, 50 to 200", backend, growth, "", GOAL_EKF_4)]
 
 
-def _cycle(slam: SlamFilter, world: World, batch: int, read_pose: bool) -> Callable[[], object]:
-    """Ten predictions and one update of five landmarks."""
-    increment = world.increment(batch)
-    z = np.tile(world.z[world.seen], (batch, 1, 1))
-
-    def go() -> None:
-        for _ in range(10):
-            slam.predict(increment)
-            if read_pose:
-                slam.pose()
-        slam.update(world.seen, z, world.cov_z)
-
-    return go
-
-
-def cycle_ratios(batch: int, landmarks: int, repeats: int = 9, read_pose: bool = False) -> dict[str, float]:
-    """Time of a cycle of each form of the IEKF over the EKF's: median of paired ratios, one thread."""
-    world = World(landmarks)
-    things = {"ekf": _cycle(world.start(EkfSlam, batch), world, batch, read_pose)}
-    for form in ("reduced", "reduced-map", "lifted"):
-        slam = world.start(lambda x, P, c, form=form: carleman_ekf(x, P, form, c), batch)  # type: ignore[misc]
-        things[form] = _cycle(slam, world, batch, read_pose)
-    with threadpool_limits(1):
-        ratio = paired(things, repeats).ratio
-    return {form: ratio[form] for form in list(things)[1:]}
-
-
-def cycles(backend: str, quick: bool) -> list[dict[str, Any]]:
+def cycles(backend: str, quick: bool) -> list[Row]:
     """EKF-2: ten predictions and one update, forms of the IEKF against the EKF."""
     rows, repeats = [], 3 if quick else 9
     for batch, n in ((1, 10), (1, 30), (1, 100), (1, 200), (50, 30)):
@@ -127,21 +94,38 @@ def cycles(backend: str, quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def study(backend: str, quick: bool) -> list[dict[str, Any]]:
-    """EKF-3: the study of figures 2-4 with the reduced and with the lifted form, in this process."""
-    rows = []
+def study(backend: str, quick: bool) -> list[Row]:
+    """EKF-3: the runs of figures 2-4 with the reduced and with the lifted form, in this process."""
+    rows, runs, config = [], 5 if quick else 50, VehicleFieldConfig()
     for form in ("reduced", "lifted"):
-        runs = 5 if quick else 50
-        config = StudyConfig(
-            runs=runs, population=runs, control_runs=0, filters=("ekf", "iekf"), iekf_form=form
-        )
-        warm_up = dataclasses.replace(
-            config, runs=2, population=2, field=dataclasses.replace(config.field, laps=1)
-        )
-        run_study(warm_up)
+        drive(dataclasses.replace(config, laps=1), form, 2)  # compile, fill caches
         start = time.perf_counter()
-        run_study(config)
+        drive(config, form, runs)
         bound = None if quick else GOALS_EKF_3[backend, form]
         case = f"study of {runs} runs, IEKF {form}"
         rows.append(row("EKF-3", case, backend, time.perf_counter() - start, "s", bound))
     return rows
+
+
+def drive(config: VehicleFieldConfig, form: str, runs: int) -> None:
+    """Take the EKF and the IEKF through the whole course from both P0, the pose read at every step."""
+    world = make_field(config, np.random.default_rng(0))
+    noise = draw_noise(world, [np.random.default_rng(k) for k in range(runs)])
+    for variances in (P0_LOW, P0_HIGH):
+        start, P0 = world.poses[0] + noise.start * np.sqrt(variances), np.diag(variances)
+        _through(EkfSlam(start, P0), world, noise)
+        _through(carleman_ekf(start, P0, form), world, noise)
+
+
+def _through(slam: SlamFilter, world: VehicleField, noise: Noise) -> None:
+    c = world.config
+    controls = world.controls + noise.controls * np.array([c.sigma_v, c.sigma_phi])
+    seen = {
+        s.step: (s.ids, s.z + c.sigma_z * e) for s, e in zip(world.sightings, noise.sightings, strict=True)
+    }
+    for k in range(controls.shape[1] + 1):
+        if k:
+            slam.predict(vehicle.ackermann_increment(controls[:, k - 1], c.cov_u, c.wheelbase, c.dt))
+        if k in seen:
+            slam.update(*seen[k], c.cov_z)
+        slam.pose()

@@ -17,23 +17,20 @@ The ratio of OG-1 is that of the plain grid (one log-odds addition per cell).  S
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
-from vslam_ref import _kernels
 from vslam_ref.arrays import Array
-from vslam_ref.bench.rows import row
-from vslam_ref.bench.timing import paired
+from vslam_ref.bench.rows import Row, each_backend, row
 from vslam_ref.datasets import carmen, catalogue
 from vslam_ref.grids import MapConfig, StaticDynamicMap, inverse_sensor, static_dynamic
 from vslam_ref.grids.log_odds import log_odds
 from vslam_ref.grids.plain import apply_plain
+from vslam_ref.support.timing import paired
 
 BEAMS, CELLS, RESOLUTION, HALF = 360, 400, 0.1, 19.5
 GOALS_OG_1 = {"numpy": 30.0, "numba": 300.0}
@@ -43,12 +40,9 @@ LOGS = ("intel", "aces", "csail", "edmonton", "fhw", "freiburg-079")
 
 def run(quick: bool = False) -> dict[str, Any]:
     """Measure everything on one thread; ``rows`` is a list of flat records."""
-    backends = [b for b in ("numpy", "numba") if b == "numpy" or importlib.util.find_spec("numba")]
-    rows: list[dict[str, Any]] = []
-    with threadpool_limits(1):
-        for backend in backends:
-            with _kernels.use_backend(backend):
-                rows += one_scan(backend, quick) + real_logs(backend, quick)
+    rows: list[Row] = []
+    for backend in each_backend():
+        rows += one_scan(backend, quick) + real_logs(backend, quick)
     return {"rows": rows, "threads": 1, "peer": "Bresenham loops in plain Python"}
 
 
@@ -100,7 +94,7 @@ def scan_in_cells() -> tuple[Array, Array, NDArray[np.bool_]]:
     return start, ends, np.ones(BEAMS, dtype=np.bool_)
 
 
-def one_scan(backend: str, quick: bool) -> list[dict[str, Any]]:
+def one_scan(backend: str, quick: bool) -> list[Row]:
     """OG-1."""
     angles, ranges = room()
     ox, oy = (ranges * np.cos(angles)).tolist(), (ranges * np.sin(angles)).tolist()
@@ -123,27 +117,25 @@ def one_scan(backend: str, quick: bool) -> list[dict[str, Any]]:
         "S and D": s_and_d,
         "Bresenham loops": lambda: peer(ox, oy),
     }
-    result = paired(things, 3 if quick else 15)
-    took = result.seconds
-    least = GOALS_OG_1[backend]
+    took, ratio = paired(things, 3 if quick else 15)
+    rows = [row("OG-1", f"{name}, one scan", backend, 1e3 * took[name], "ms") for name in things]
+    peers = took["Bresenham loops"] / took["S and D"]
     return [
-        row("OG-1", "plain grid, one scan", backend, 1e3 * took["plain grid"], "ms"),
-        row("OG-1", "S and D, one scan", backend, 1e3 * took["S and D"], "ms"),
-        row("OG-1", "Bresenham loops, one scan", backend, 1e3 * took["Bresenham loops"], "ms"),
+        *rows,
         row(
             "OG-1",
             "Bresenham loops / plain grid",
             backend,
-            result.ratio["Bresenham loops"],
+            ratio["Bresenham loops"],
             "x",
-            least,
+            GOALS_OG_1[backend],
             below=False,
         ),
-        row("OG-1", "Bresenham loops / S and D", backend, took["Bresenham loops"] / took["S and D"], "x"),
+        row("OG-1", "Bresenham loops / S and D", backend, peers, "x"),
     ]
 
 
-def real_logs(backend: str, quick: bool) -> list[dict[str, Any]]:
+def real_logs(backend: str, quick: bool) -> list[Row]:
     """Scans a second into S and D, the map growing on the way; logs that are not found are left out."""
     folder = catalogue.find("carmen_2d")
     rows = []

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from vslam_ref.bench.rows import row
+from vslam_ref.bench.rows import Row, backends, row
 
 GOAL_IMPORT, GOAL_FIRST_CALL = 1.5, 0.6
 
@@ -40,7 +38,7 @@ print(time.perf_counter() - start)
 """
 
 
-def imports(quick: bool) -> list[dict[str, Any]]:
+def imports(quick: bool) -> list[Row]:
     """IM-1, and beside it the part of the first call that any program with one Numba kernel pays."""
     repeats = 3 if quick else 9
     ratios = []
@@ -49,7 +47,7 @@ def imports(quick: bool) -> list[dict[str, Any]]:
         ratios.append(_seconds(_timed("import vslam_ref, numpy")) / base)
     case = "import vslam_ref / import numpy"
     rows = [row("IM-1", case, "-", float(np.median(ratios)), "x", GOAL_IMPORT)]
-    if not importlib.util.find_spec("numba"):
+    if "numba" not in backends():
         return rows
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "empty_kernel.py").write_text(_EMPTY_KERNEL)

@@ -1,8 +1,16 @@
-"""One measured figure as a flat record, with its goal and whether it is met."""
+"""Measured figures as flat records, each with its goal and whether it is met; the backends they are for."""
 
 from __future__ import annotations
 
+import importlib.util
+from collections.abc import Iterator
 from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from vslam_ref import _kernels
+
+Row = dict[str, Any]
 
 
 def row(
@@ -14,7 +22,7 @@ def row(
     bound: float | None = None,
     *,
     below: bool = True,
-) -> dict[str, Any]:
+) -> Row:
     """Return a record of ``vslam-ref bench``.
 
     Parameters
@@ -37,13 +45,21 @@ def row(
     >>> row("IM-1", "import", "-", 1.2, "x", 1.5)["met"]
     'yes'
     """
-    met = None if bound is None else (value <= bound if below else value >= bound)
-    return {
-        "goal": goal,
-        "case": case,
-        "backend": backend,
-        "value": value,
-        "unit": unit,
-        "bound": None if bound is None else f"{'<=' if below else '>='} {bound:g}",
-        "met": {None: None, True: "yes", False: "no"}[met],
-    }
+    record = {"goal": goal, "case": case, "backend": backend, "value": float(value), "unit": unit}
+    if bound is None:
+        return {**record, "bound": None, "met": None}
+    met = value <= bound if below else value >= bound
+    return {**record, "bound": f"{'<=' if below else '>='} {bound:g}", "met": "yes" if met else "no"}
+
+
+def backends() -> list[str]:
+    """Backends that are there: ``numpy``, and ``numba`` where it is installed."""
+    return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
+
+
+def each_backend() -> Iterator[str]:
+    """Yield the backends' names; while one is out, it is in use, on one thread."""
+    with threadpool_limits(1):
+        for backend in backends():
+            with _kernels.use_backend(backend):
+                yield backend

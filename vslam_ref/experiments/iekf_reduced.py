@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.bench.filters import PAPER_POSE_RATIO, cycle_ratios
 from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
 from vslam_ref.experiments.iekf.study import StudyConfig, run_noise, study_field
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, ReducedCarlemanEkf, Variant
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.metrics.consistency import pose_error
+from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, cycle_ratios
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

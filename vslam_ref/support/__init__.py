@@ -8,5 +8,6 @@ module          holds
 ``config``      ``key=value`` settings of frozen dataclasses, and their reasons
 ``json_text``   values as JSON text
 ``provenance``  versions, git commit, platform
+``timing``      ratios of times that hold when the machine's speed drifts
 ==============  ==========================================================================
 """

@@ -1,11 +1,9 @@
-"""Problems to measure with: a chain of views as from a car, and a published problem where it is found."""
+"""A bundle adjustment problem of any size: a chain of views as from a car on a winding road."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.datasets import catalogue
-from vslam_ref.datasets.bundle_files import read_bal
 from vslam_ref.estimation.bundle import BundleProblem, Observations, Scene, freedom
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Radtan, projection
@@ -54,24 +52,3 @@ def chain(views: int, seed: int = 0) -> BundleProblem:
     start = Scene(se3.perturb(T, xi), X + 0.08 * rng.standard_normal(X.shape), off)
     seen = Observations(view[valid], point[valid], uv[valid])
     return BundleProblem(Radtan, start, seen, free=freedom(Radtan, start, intrinsics=("f", "k1", "k2")))
-
-
-def published() -> BundleProblem | None:
-    """BAL's 16-22106, or None where it is not found."""
-    folder = catalogue.find("bal")
-    return None if folder is None else read_bal(folder / "problem-16-22106-pre.txt.bz2").problem
-
-
-def cost(problem: BundleProblem, scene: Scene) -> float:
-    """Half the sum of squares of a scene: the one function that judges every solver's result.
-
-    A point behind its camera makes it infinite, whatever the solver thought of it.
-    """
-    seen = problem.seen
-    at = projection.pixel_from_world(
-        scene.intrinsics[problem.lens_of_view[seen.view]],
-        scene.T_cam_world[seen.view],
-        scene.X_world[seen.point],
-        lens=problem.model.lens,
-    )
-    return 0.5 * float(np.sum((at.uv - seen.uv) ** 2)) if at.valid.all() else float("inf")

@@ -30,20 +30,16 @@ def paired(
     least_seconds : float
         A quick call is repeated within one measurement until it lasts this long.
     """
-    loops = {name: _loops(call, least_seconds) for name, call in things.items()}
-    seconds = {name: [] for name in things}  # type: dict[str, list[float]]
-    for _ in range(repeats):
-        for name, call in things.items():
-            seconds[name].append(_measure(call, loops[name]))
-    first = np.array(seconds[next(iter(things))])
-    medians = {name: float(np.median(values)) for name, values in seconds.items()}
-    ratios = {name: float(np.median(np.array(values) / first)) for name, values in seconds.items()}
-    return Paired(medians, ratios)
-
-
-def _loops(call: Callable[[], object], least_seconds: float) -> int:
-    call()  # compile, fill caches
-    return max(1, int(np.ceil(least_seconds / max(_measure(call, 1), 1e-9))))
+    loops = {}
+    for name, call in things.items():
+        call()  # compile, fill caches
+        loops[name] = max(1, int(np.ceil(least_seconds / max(_measure(call, 1), 1e-9))))
+    rows = [[_measure(call, loops[name]) for name, call in things.items()] for _ in range(repeats)]
+    seconds = np.array(rows)  # (repeats, things)
+    medians, ratios = np.median(seconds, 0), np.median(seconds / seconds[:, :1], 0)
+    return Paired(
+        dict(zip(things, medians.tolist(), strict=True)), dict(zip(things, ratios.tolist(), strict=True))
+    )
 
 
 def _measure(call: Callable[[], object], loops: int) -> float:
