@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, as_array, transpose
 
 BLOCKS = {"SE2": {"rho": 2, "phi": 1}, "SE3": {"rho": 3, "phi": 3}, "Sim3": {"rho": 3, "phi": 3, "sigma": 1}}
 """Length of each block of a tangent vector, in our order."""
@@ -84,8 +84,8 @@ def _convention(name: str) -> Convention:
     return CONVENTIONS[name]
 
 
-def _inverse_adjoint(Ad: Array) -> Array:
-    return np.asarray(np.linalg.inv(Ad))
+def _inverse(M: Array) -> Array:
+    return np.asarray(np.linalg.inv(M))
 
 
 def _from_left(convention: Convention, Ad: Array) -> Array:
@@ -94,10 +94,10 @@ def _from_left(convention: Convention, Ad: Array) -> Array:
     n, turn = sum(sizes.values()), slice(sizes["rho"], sizes["rho"] + sizes["phi"])
     M = np.broadcast_to(np.eye(n), Ad.shape).copy()
     if convention.side == "right":  # Exp(xi) T = T Exp(Ad^-1 xi)
-        M = _inverse_adjoint(Ad)
+        M = _inverse(Ad)
     elif convention.side == "split":  # t changes by rho + phi x t (+ sigma t): hat(t) R stands in Ad
         r = sizes["rho"]
-        M[..., :r, r:] = -Ad[..., :r, r:] @ _inverse_adjoint(Ad[..., r:, r:])
+        M[..., :r, r:] = -Ad[..., :r, r:] @ _inverse(Ad[..., r:, r:])
     M[..., turn, :] *= convention.angle_unit
     starts = dict(zip(sizes, np.cumsum([0, *sizes.values()]), strict=False))
     rows = np.concatenate([starts[block] + np.arange(sizes[block]) for block in convention.order])
@@ -143,33 +143,33 @@ def tangent_matrix(source: str, target: str, adjoint: ArrayLike, *, of_inverse: 
     """
     first, second = _convention(source), _convention(target)
     n = sum(BLOCKS[first.group].values())
-    Ad = np.asarray(adjoint, dtype=np.float64)
+    Ad = as_array("adjoint", adjoint)
     if first.group != second.group:
         raise ValueError(f"{source} is of {first.group}, {target} of {second.group}: need one group")
     if Ad.shape[-2:] != (n, n):
         raise ValueError(f"adjoint has shape {Ad.shape}: {first.group} needs (..., {n}, {n})")
-    back = np.linalg.inv(_from_left(first, Ad))
+    back = _inverse(_from_left(first, Ad))
     if not of_inverse:
         return np.asarray(_from_left(second, Ad) @ back)
-    Ad_inverse = _inverse_adjoint(Ad)  # (Exp(xi) T)^-1 = T^-1 Exp(-xi) = Exp(-Ad^-1 xi) T^-1
+    Ad_inverse = _inverse(Ad)  # (Exp(xi) T)^-1 = T^-1 Exp(-xi) = Exp(-Ad^-1 xi) T^-1
     return np.asarray(-_from_left(second, Ad_inverse) @ Ad_inverse @ back)
 
 
 def convert_covariance(cov: ArrayLike, M: ArrayLike) -> Array:
     """Covariance in the target's tangent vectors: M cov M^T, shapes (..., n, n)."""
-    M = np.asarray(M, dtype=np.float64)
-    return np.asarray(M @ np.asarray(cov, dtype=np.float64) @ np.swapaxes(M, -1, -2))
+    M = as_array("M", M)
+    return np.asarray(M @ as_array("cov", cov) @ transpose(M))
 
 
 def convert_information(information: ArrayLike, M: ArrayLike) -> Array:
     """Information matrix (inverse covariance) in the target's tangent vectors: M^-T L M^-1."""
-    back = np.linalg.inv(np.asarray(M, dtype=np.float64))
-    return np.asarray(np.swapaxes(back, -1, -2) @ np.asarray(information, dtype=np.float64) @ back)
+    back = _inverse(as_array("M", M))
+    return np.asarray(transpose(back) @ as_array("information", information) @ back)
 
 
 def convert_jacobian(J: ArrayLike, M: ArrayLike) -> Array:
     """Jacobian (..., m, n) whose columns are the target's tangent directions: J M^-1."""
-    return np.asarray(np.asarray(J, dtype=np.float64) @ np.linalg.inv(np.asarray(M, dtype=np.float64)))
+    return np.asarray(as_array("J", J) @ _inverse(as_array("M", M)))
 
 
 def similarity_from_gtsam(M: ArrayLike) -> Array:
@@ -215,9 +215,7 @@ def quaternion_to_wxyz(q: ArrayLike, order: str, *, product: str = "hamilton") -
     >>> quaternion_to_wxyz([0.0, 0.6, 0.0, 0.8], "xyzw").tolist()
     [0.8, 0.0, 0.6, 0.0]
     """
-    q = np.asarray(q, dtype=np.float64)
-    if q.shape[-1:] != (4,):
-        raise ValueError(f"quaternion has shape {q.shape}: need (..., 4)")
+    q = as_array("quaternion", q, 4)
     if order not in ("wxyz", "xyzw") or product not in ("hamilton", "jpl"):
         raise ValueError(f"order={order!r}, product={product!r}: need wxyz or xyzw, and hamilton or jpl")
     q = np.roll(q, 1, axis=-1) if order == "xyzw" else q.copy()

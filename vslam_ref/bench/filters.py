@@ -120,9 +120,8 @@ def drive(config: VehicleFieldConfig, form: str, runs: int) -> None:
 def _through(slam: SlamFilter, world: VehicleField, noise: Noise) -> None:
     c = world.config
     controls = world.controls + noise.controls * np.array([c.sigma_v, c.sigma_phi])
-    seen = {
-        s.step: (s.ids, s.z + c.sigma_z * e) for s, e in zip(world.sightings, noise.sightings, strict=True)
-    }
+    pairs = zip(world.sightings, noise.sightings, strict=True)
+    seen = {s.step: (s.ids, s.z + c.sigma_z * e) for s, e in pairs}
     for k in range(controls.shape[1] + 1):
         if k:
             slam.predict(vehicle.ackermann_increment(controls[:, k - 1], c.cov_u, c.wheelbase, c.dt))

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from vslam_ref.arrays import Array
 
 
@@ -32,3 +34,9 @@ class Mapped(NamedTuple):
 
     value: Array
     J_pose: Array
+
+
+def combined(value: Array, J_a: Array, J_b: Array, axes: int = 2) -> Combined:
+    """Value, an element of ``axes`` axes, and its Jacobians (k, k) or (..., k, k) over the value's batch."""
+    shape = (*value.shape[: value.ndim - axes], *J_b.shape[-2:])
+    return Combined(value, np.broadcast_to(J_a, shape), np.broadcast_to(J_b, shape))

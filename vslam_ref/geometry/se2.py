@@ -11,31 +11,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, as_array, blocks
+from vslam_ref.arrays import Array, as_array, blocks, times
 from vslam_ref.geometry import so2
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
+from vslam_ref.geometry.coefficients import rotation_coefficients
+from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
 
 DOF = 3
 
-_SMALL = 0.05
-"""Below this angle the series of :func:`_sinc_cosc` are used.
 
-Their first neglected terms are phi^10/11! and phi^9/10!-sized: under 1e-18 at the threshold, so both
-branches agree to rounding; above it ``(1 - cos)/phi`` is evaluated as ``2 sin^2(phi/2)/phi`` and loses
-no digit either.
-"""
+def _turn(a: Array, b: Array) -> Array:
+    """Matrices [[a, -b], [b, a]], shapes (...) -> (..., 2, 2)."""
+    return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], -2)
 
 
-def _sinc_cosc(phi: Array) -> tuple[Array, Array]:
-    """sin(phi)/phi and (1 - cos(phi))/phi, exact at 0."""
-    small = np.abs(phi) < _SMALL
-    p = np.where(small, 1.0, phi)
-    q = phi * phi
-    sinc_series = 1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72)))
-    cosc_series = phi / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56)))
-    sinc = np.where(small, sinc_series, np.sin(p) / p)
-    cosc = np.where(small, cosc_series, 2 * np.sin(p / 2) ** 2 / p)
-    return sinc, cosc
+def _v(phi: Array) -> Array:
+    """V(phi) = [[sin, -(1 - cos)], [1 - cos, sin]] / phi, shape (...) -> (..., 2, 2)."""
+    c = rotation_coefficients(phi * phi)
+    return _turn(c[1], phi * c[2])
+
+
+def _v_inverse(phi: Array) -> Array:
+    """V(phi)^-1 = [[h, phi/2], [-phi/2, h]] with h = (phi/2) cot(phi/2), shape (...) -> (..., 2, 2)."""
+    half = rotation_coefficients(phi * phi / 4)
+    return _turn(half[0] / half[1], -phi / 2)
 
 
 def identity(shape: tuple[int, ...] = ()) -> Array:
@@ -45,12 +43,8 @@ def identity(shape: tuple[int, ...] = ()) -> Array:
 
 def matrix(pose: ArrayLike) -> Array:
     """Homogeneous matrix of a pose vector, shape (..., 3) -> (..., 3, 3)."""
-    pose = np.asarray(pose, dtype=np.float64)
-    T = np.zeros((*pose.shape[:-1], 3, 3))
-    T[..., :2, :2] = so2.exp(pose[..., 2])
-    T[..., :2, 2] = pose[..., :2]
-    T[..., 2, 2] = 1.0
-    return T
+    pose = as_array("pose", pose, 3)
+    return blocks([[so2.exp(pose[..., 2]), pose[..., :2, None]], [0.0, np.ones((1, 1))]])
 
 
 def hat(xi: ArrayLike) -> Array:
@@ -98,11 +92,9 @@ def exp(xi: ArrayLike) -> Array:
 
     V(phi) = [[sin, -(1 - cos)], [1 - cos, sin]] / phi; the motion at constant velocity xi for unit time.
     """
-    xi = np.asarray(xi, dtype=np.float64)
-    sinc, cosc = _sinc_cosc(xi[..., 2])
-    x = sinc * xi[..., 0] - cosc * xi[..., 1]
-    y = cosc * xi[..., 0] + sinc * xi[..., 1]
-    return np.stack([x, y, so2.wrap(xi[..., 2])], -1)
+    xi = as_array("xi", xi, 3)
+    t = times(_v(xi[..., 2]), xi[..., :2])
+    return np.concatenate([t, so2.wrap(xi[..., 2:])], -1)
 
 
 def log(pose: ArrayLike) -> Array:
@@ -110,19 +102,9 @@ def log(pose: ArrayLike) -> Array:
 
     rho = V(phi)^-1 t, where V^-1 = [[h, phi/2], [-phi/2, h]] and h = (phi/2) cot(phi/2).
     """
-    pose = np.asarray(pose, dtype=np.float64)
-    phi = so2.wrap(pose[..., 2])
-    h = _half_cot(phi)
-    x = h * pose[..., 0] + phi / 2 * pose[..., 1]
-    y = -phi / 2 * pose[..., 0] + h * pose[..., 1]
-    return np.stack([x, y, phi], -1)
-
-
-def _half_cot(phi: Array) -> Array:
-    """(phi/2) cot(phi/2), equal to 1 at 0: sinc/(2 cosc/phi) with both factors smooth."""
-    half = phi / 2
-    sinc, _ = _sinc_cosc(half)
-    return np.cos(half) / sinc
+    pose = as_array("pose", pose, 3)
+    phi = so2.wrap(pose[..., 2:])
+    return np.concatenate([times(_v_inverse(phi[..., 0]), pose[..., :2]), phi], -1)
 
 
 def ad(xi: ArrayLike) -> Array:
@@ -138,13 +120,9 @@ def ad(xi: ArrayLike) -> Array:
 
 def adjoint(pose: ArrayLike) -> Array:
     """Matrix Ad_T with T Exp(xi) T^-1 = Exp(Ad_T xi), shape (..., 3) -> (..., 3, 3)."""
-    pose = np.asarray(pose, dtype=np.float64)
-    Ad = np.zeros((*pose.shape[:-1], 3, 3))
-    Ad[..., :2, :2] = so2.exp(pose[..., 2])
-    Ad[..., 0, 2] = pose[..., 1]
-    Ad[..., 1, 2] = -pose[..., 0]
-    Ad[..., 2, 2] = 1.0
-    return Ad
+    pose = as_array("pose", pose, 3)
+    lever = np.stack([pose[..., 1], -pose[..., 0]], -1)[..., None]
+    return blocks([[so2.exp(pose[..., 2]), lever], [0.0, np.ones((1, 1))]])
 
 
 def left_jacobian(xi: ArrayLike) -> Array:
@@ -153,43 +131,22 @@ def left_jacobian(xi: ArrayLike) -> Array:
     With V as in :func:`exp`, J_l = [[V, b], [0, 1]]; b follows from dt/dphi = V'(phi) rho less the
     lever S t of the left rotation, S = [[0, -1], [1, 0]].
     """
-    xi = np.asarray(xi, dtype=np.float64)
-    rx, ry, phi = xi[..., 0], xi[..., 1], xi[..., 2]
-    sinc, cosc = _sinc_cosc(phi)
-    k1, k2 = _jacobian_tail(phi)
-    J = np.zeros((*xi.shape[:-1], 3, 3))
-    J[..., 0, 0] = J[..., 1, 1] = sinc
-    J[..., 0, 1], J[..., 1, 0] = -cosc, cosc
-    J[..., 0, 2] = k1 * rx + k2 * ry
-    J[..., 1, 2] = -k2 * rx + k1 * ry
-    J[..., 2, 2] = 1.0
-    return J
+    xi = as_array("xi", xi, 3)
+    return blocks([[_v(xi[..., 2]), _bend(xi)], [0.0, np.ones((1, 1))]])
 
 
-def _jacobian_tail(phi: Array) -> tuple[Array, Array]:
-    """k1 = (phi - sin phi)/phi^2 and k2 = (1 - cos phi)/phi^2, exact at 0."""
-    small = np.abs(phi) < 0.5
-    p = np.where(small, 1.0, phi)
-    q = phi * phi
-    # six terms: the first neglected one is below 2^-53 of the sum at |phi| = 0.5
-    tail = 1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156 * (1 - q / 210)))))
-    k1 = np.where(small, phi / 6 * tail, (p - np.sin(p)) / (p * p))
-    half, _ = _sinc_cosc(phi / 2)
-    return k1, half * half / 2
+def _bend(xi: Array) -> Array:
+    """Last column b of the left Jacobian, c_3 phi rho + c_2 (rho_y, -rho_x), shape (..., 2, 1)."""
+    phi = xi[..., 2]
+    c = rotation_coefficients(phi * phi)
+    return times(_turn(phi * c[3], -c[2]), xi[..., :2])[..., None]
 
 
 def left_jacobian_inverse(xi: ArrayLike) -> Array:
     """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); defined for |phi| < 2 pi."""
-    xi = np.asarray(xi, dtype=np.float64)
-    J = left_jacobian(xi)
-    phi = xi[..., 2]
-    h = _half_cot(phi)
-    inv = np.zeros_like(J)
-    inv[..., 0, 0] = inv[..., 1, 1] = h
-    inv[..., 0, 1], inv[..., 1, 0] = phi / 2, -phi / 2
-    inv[..., :2, 2] = -np.einsum("...ij,...j->...i", inv[..., :2, :2], J[..., :2, 2])
-    inv[..., 2, 2] = 1.0
-    return inv
+    xi = as_array("xi", xi, 3)
+    V_inv = _v_inverse(xi[..., 2])
+    return blocks([[V_inv, -V_inv @ _bend(xi)], [0.0, np.ones((1, 1))]])
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
@@ -234,16 +191,13 @@ def act_with_jacobians(pose: ArrayLike, x: ArrayLike) -> Acted:
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`compose`: I in a, Ad_a in b."""
-    value = compose(a, b)
-    shape = (*value.shape, DOF)
-    return Combined(value, np.broadcast_to(np.eye(DOF), shape), np.broadcast_to(adjoint(a), shape))
+    return combined(compose(a, b), np.eye(DOF), adjoint(a), axes=1)
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`between`: -Ad of T_a^-1 in a, Ad of T_a^-1 in b."""
-    value = between(a, b)
-    J_b = np.broadcast_to(adjoint(inverse(a)), (*value.shape, DOF))
-    return Combined(value, -J_b, J_b)
+    Ad = adjoint(inverse(a))
+    return combined(between(a, b), -Ad, Ad, axes=1)
 
 
 def inverse_with_jacobians(pose: ArrayLike) -> Mapped:

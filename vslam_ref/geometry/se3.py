@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, as_array, blocks, times, transpose
 from vslam_ref.geometry import so3
 from vslam_ref.geometry.coefficients import rotation_coefficients
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
+from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
 
 DOF = 6
 
@@ -207,16 +207,13 @@ def act_with_jacobians(T: ArrayLike, x: ArrayLike) -> Acted:
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`compose`: I in a; Ad_a in b, as Exp(d) goes through a as Exp(Ad_a d)."""
-    value = compose(a, b)
-    shape = (*value.shape[:-2], DOF, DOF)
-    return Combined(value, np.broadcast_to(np.eye(DOF), shape), np.broadcast_to(adjoint(a), shape))
+    return combined(compose(a, b), np.eye(DOF), adjoint(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`between`: -Ad of T_a^-1 in a, Ad of T_a^-1 in b."""
-    value = between(a, b)
-    J_b = np.broadcast_to(adjoint(inverse(a)), (*value.shape[:-2], DOF, DOF))
-    return Combined(value, -J_b, J_b)
+    Ad = adjoint(inverse(a))
+    return combined(between(a, b), -Ad, Ad)
 
 
 def inverse_with_jacobians(T: ArrayLike) -> Mapped:

@@ -23,18 +23,20 @@ from vslam_ref.geometry.coefficients import (
     rotation_polynomial,
     similarity_coefficients,
 )
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
+from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
 from vslam_ref.geometry.nearest import nearest_rotation
+
+# of 4 x 4 matrices: the same functions as for rigid motions
+from vslam_ref.geometry.se3 import act as act
+from vslam_ref.geometry.se3 import compose as compose
+from vslam_ref.geometry.se3 import identity as identity
+from vslam_ref.geometry.se3 import matrix as matrix
+from vslam_ref.geometry.se3 import translation as translation
 
 DOF = 7
 
 _HALVINGS = 4  # then |sigma + i theta| < 0.65 for |sigma| < 8 and theta < 2 pi
 _TERMS = 14  # the first one left out is below 0.65^15 / 16! < 1e-16
-
-
-def identity(shape: tuple[int, ...] = ()) -> Array:
-    """Identity similarities, shape (*shape, 4, 4)."""
-    return np.broadcast_to(np.eye(4), (*shape, 4, 4)).copy()
 
 
 def from_srt(s: ArrayLike, R: ArrayLike, t: ArrayLike) -> Array:
@@ -63,16 +65,6 @@ def rotation(S: ArrayLike) -> Array:
     """R_a_b of S_a_b, shape (..., 4, 4) -> (..., 3, 3)."""
     S = as_array("S", S, 4, 4)
     return np.asarray(S[..., :3, :3] / scale(S)[..., None, None])
-
-
-def translation(S: ArrayLike) -> Array:
-    """t_a_b of S_a_b, shape (..., 4, 4) -> (..., 3)."""
-    return as_array("S", S, 4, 4)[..., :3, 3]
-
-
-def matrix(S: ArrayLike) -> Array:
-    """The element as a matrix: itself, shape (..., 4, 4)."""
-    return as_array("S", S, 4, 4)
 
 
 def hat(xi: ArrayLike) -> Array:
@@ -130,11 +122,6 @@ def log(S: ArrayLike) -> Array:
     return np.concatenate([rho, phi, sigma[..., None]], -1)
 
 
-def compose(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product S_a S_b, shapes (..., 4, 4)."""
-    return np.asarray(as_array("a", a, 4, 4) @ as_array("b", b, 4, 4))
-
-
 def inverse(S: ArrayLike) -> Array:
     """S^-1: scale 1/s, rotation R^T, translation -R^T t / s; shape (..., 4, 4)."""
     s, R_back = scale(S), transpose(rotation(S))
@@ -144,12 +131,6 @@ def inverse(S: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """S_a^-1 S_b, shapes (..., 4, 4)."""
     return compose(inverse(a), b)
-
-
-def act(S: ArrayLike, x: ArrayLike) -> Array:
-    """Coordinates in a of points ``x (..., 3)`` in b, by ``S_a_b (..., 4, 4)``: s R x + t."""
-    S = as_array("S", S, 4, 4)
-    return np.asarray(times(S[..., :3, :3], as_array("x", x, 3)) + S[..., :3, 3])
 
 
 def ad(xi: ArrayLike) -> Array:
@@ -245,16 +226,13 @@ def act_with_jacobians(S: ArrayLike, x: ArrayLike) -> Acted:
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`compose`: I in a, Ad_a in b."""
-    value = compose(a, b)
-    shape = (*value.shape[:-2], DOF, DOF)
-    return Combined(value, np.broadcast_to(np.eye(DOF), shape), np.broadcast_to(adjoint(a), shape))
+    return combined(compose(a, b), np.eye(DOF), adjoint(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`between`: -Ad of S_a^-1 in a, Ad of S_a^-1 in b."""
-    value = between(a, b)
-    J_b = np.broadcast_to(adjoint(inverse(a)), (*value.shape[:-2], DOF, DOF))
-    return Combined(value, -J_b, J_b)
+    Ad = adjoint(inverse(a))
+    return combined(between(a, b), -Ad, Ad)
 
 
 def inverse_with_jacobians(S: ArrayLike) -> Mapped:

@@ -21,7 +21,7 @@ from vslam_ref.geometry.coefficients import (
     rotation_coefficients,
     rotation_polynomial,
 )
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped
+from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
 from vslam_ref.geometry.nearest import nearest_rotation
 
 DOF = 3
@@ -167,15 +167,12 @@ def act_with_jacobians(R: ArrayLike, x: ArrayLike) -> Acted:
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`compose`: Exp(d) goes through a as Exp(R_a d)."""
-    value = compose(a, b)
-    return Combined(value, identity(value.shape[:-2]), np.broadcast_to(matrix(a), value.shape))
+    return combined(compose(a, b), np.eye(DOF), matrix(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     """Value and Jacobians of :func:`between`: -R_a^-1 and R_a^-1."""
-    value = between(a, b)
-    J_b = np.broadcast_to(inverse(a), value.shape)
-    return Combined(value, -J_b, J_b)
+    return combined(between(a, b), -inverse(a), inverse(a))
 
 
 def inverse_with_jacobians(R: ArrayLike) -> Mapped:

@@ -36,10 +36,8 @@ def paired(
         loops[name] = max(1, int(np.ceil(least_seconds / max(_measure(call, 1), 1e-9))))
     rows = [[_measure(call, loops[name]) for name, call in things.items()] for _ in range(repeats)]
     seconds = np.array(rows)  # (repeats, things)
-    medians, ratios = np.median(seconds, 0), np.median(seconds / seconds[:, :1], 0)
-    return Paired(
-        dict(zip(things, medians.tolist(), strict=True)), dict(zip(things, ratios.tolist(), strict=True))
-    )
+    medians, ratios = np.median(seconds, 0).tolist(), np.median(seconds / seconds[:, :1], 0).tolist()
+    return Paired(dict(zip(things, medians, strict=True)), dict(zip(things, ratios, strict=True)))
 
 
 def _measure(call: Callable[[], object], loops: int) -> float:

@@ -100,7 +100,7 @@ def _walk(node: ast.AST) -> Iterator[ast.AST]:
         for statement in node.orelse:
             yield from _walk(statement)
         return
-    if isinstance(node, ast.Call) and _called(node) in ("as_array", "as_points", "zeros", "empty", "ones"):
+    if isinstance(node, ast.Call) and _called(node) in ("as_array", "zeros", "empty", "ones"):
         return  # shapes and names
     if isinstance(node, ast.AnnAssign):
         if node.value is not None:

@@ -164,6 +164,38 @@ def _excess(peer: str, name: str, problem: BundleProblem, theirs: Timed, mine: T
     return row("BA-2", f"{peer}'s cost over ours, less 1, {name}", "-", excess, "")
 
 
+def steps_to_best(sizes: tuple[int, ...]) -> list[Row]:
+    """BA-3: steps until within 1e-4 of the lowest cost that anyone reached."""
+    rows = []
+    for views in sizes:
+        problem = chain(views)
+        result = ours(problem, backends()[-1], Options(cost=1e-9)).value
+        peer = peers.ceres(problem, 100)()
+        best = min(result.cost, cost(problem, peer.scene))
+        mine = next(k for k, step in enumerate(result.history, 1) if step.cost <= NEAR * best)
+        counts = range(1, peer.iterations + 1)
+        near = (k for k in counts if cost(problem, peers.ceres(problem, k)().scene) <= NEAR * best)
+        theirs = next(near, None)
+        case = f"steps to the best cost, chain of {views}: ours {mine}, Ceres {theirs or 'never'}"
+        ratio = mine / theirs if theirs else 0.0
+        rows.append(row("BA-3", case, "-", ratio, "x", GOAL_BA_3))
+    return rows
+
+
+def growth(sizes: tuple[int, ...], repeats: int) -> list[Row]:
+    """BA-4: time of an iteration, each size over the one before."""
+    rows = []
+    problems = [chain(views) for views in sizes]
+    for backend in backends():
+        found = [[ours(problem, backend, FIVE) for problem in problems] for _ in range(repeats)]
+        each = np.array([[timed.seconds / timed.value.iterations for timed in once] for once in found])
+        ratios = each[:, 1:] / each[:, :-1]
+        for (before, after), value in zip(itertools.pairwise(sizes), np.median(ratios, 0), strict=True):
+            case = f"iteration, chain of {after} / {before}"
+            rows.append(row("BA-4", case, backend, float(value), "x", GOAL_BA_4))
+    return rows
+
+
 _MEMORY = """
 import gc, sys
 from vslam_ref import _kernels

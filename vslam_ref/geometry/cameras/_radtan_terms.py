@@ -6,10 +6,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.geometry.cameras._roots import first_of, first_positive_root
+from vslam_ref.geometry.cameras._roots import first_positive_root, for_each_lens
 from vslam_ref.geometry.cameras.interface import MAX_TAN
 
 
@@ -69,26 +70,12 @@ def _radius_of(k: tuple[float, ...]) -> float:
     if not np.isfinite(k).all():
         return 0.0
     numerator, denominator, p = coefficients(k)
-    N = np.zeros(7)
-    N[0], N[2::2] = 1.0, numerator  # in powers of r
-    M = np.zeros(7)
-    M[0] = 1.0
-    if len(denominator):
-        M[2::2] = denominator
-    N, M = np.trim_zeros(N, "b"), np.trim_zeros(M, "b")
-    r = np.array([0.0, 1.0])
+    r, q = Polynomial([0.0, 1.0]), Polynomial([0.0, 0.0, 1.0])
+    N, M = Polynomial([1.0, *numerator])(q), Polynomial([1.0, *denominator])(q)
     bend = 6 * np.hypot(*p) * r
-    poly = np.polynomial.polynomial
-    # (r N/M)' M^2 = (r N)' M - r N M'
-    slope = poly.polysub(
-        poly.polymul(poly.polyder(poly.polymul(r, N)), M), poly.polymul(poly.polymul(r, N), poly.polyder(M))
-    )
-    roots = (
-        first_positive_root(M),
-        first_positive_root(poly.polysub(slope, poly.polymul(bend, poly.polymul(M, M)))),
-        first_positive_root(poly.polysub(N, poly.polymul(bend, M))),
-    )
-    return first_of(roots, MAX_TAN)
+    slope = (r * N).deriv() * M - r * N * M.deriv()  # (r N/M)' M^2
+    ends = (M, slope - bend * M * M, N - bend * M)
+    return min(MAX_TAN, *(first_positive_root(end.coef) for end in ends))
 
 
 def field_radius(k: ArrayLike) -> Array:
@@ -114,8 +101,4 @@ def field_radius(k: ArrayLike) -> Array:
     """
     k = np.asarray(k, dtype=np.float64)
     coefficients(k)
-    if k.ndim == 1:
-        return np.asarray(_radius_of(tuple(k.tolist())))
-    rows, which = np.unique(k.reshape(-1, k.shape[-1]), axis=0, return_inverse=True)
-    radii = np.array([_radius_of(tuple(row)) for row in rows.tolist()])
-    return radii[which].reshape(k.shape[:-1])
+    return for_each_lens(_radius_of, k)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 
-IntArray = NDArray[np.intp]
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -51,9 +50,13 @@ def _polished(c: Array, root: float) -> float:
     return root
 
 
-def first_of(roots: Sequence[float], cap: float) -> float:
-    """Smallest of some roots, and the cap."""
-    return float(min([*roots, cap]))
+def for_each_lens(ends: Callable[[tuple[float, ...]], float], k: Array) -> Array:
+    """``ends(k)`` of lens parameters (..., n), shape (...); each different lens once."""
+    if k.ndim == 1:
+        return np.asarray(ends(tuple(k.tolist())))
+    rows, which = np.unique(k.reshape(-1, k.shape[-1]), axis=0, return_inverse=True)
+    found = np.array([ends(tuple(row)) for row in rows.tolist()])
+    return np.asarray(found[which].reshape(k.shape[:-1]))
 
 
 Increasing = Callable[[Array, IntArray], tuple[Array, Array]]

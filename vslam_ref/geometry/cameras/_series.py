@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vslam_ref.arrays import Array
+from vslam_ref.geometry.coefficients import rotation_coefficients
 
 ARCTAN_SERIES = 0.1
 """Below this q the series of :func:`arctan_ratio` is used.
@@ -12,8 +13,6 @@ ARCTAN_SERIES = 0.1
 Its N-th term is below q^N: with 17 terms the rest is under 1e-17 at 0.1.  Above, the closed derivative
 subtracts two numbers near 1 and divides by 2 q: it loses a factor of at most 1 / (2 q) / (1/3) = 15.
 """
-SINE_SERIES = 0.5
-"""Below this angle (x - sin x)/x^2 is a series, seven terms to 2^-53; above, 6 / x^2 = 24 is lost at most."""
 
 
 def arctan_ratio(q: Array) -> tuple[Array, Array]:
@@ -41,9 +40,4 @@ def tan_ratio(w: Array) -> Array:
 
 def tan_ratio_slope(w: Array) -> Array:
     """dA/dw = (w - sin w) / (w cos(w/2))^2: w/6 at zero."""
-    small = np.abs(w) < SINE_SERIES
-    p = np.where(small, 1.0, w)
-    q = np.where(small, w * w, 0.0)
-    tail = 1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156 * (1 - q / 210)))))
-    lifted: Array = np.where(small, w / 6 * tail, (p - np.sin(p)) / (p * p)) / np.cos(w / 2) ** 2
-    return lifted
+    return np.asarray(w * rotation_coefficients(w * w)[3] / np.cos(w / 2) ** 2)

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry.cameras import projection
 from vslam_ref.geometry.cameras.interface import (
     Lens,
@@ -18,7 +18,6 @@ from vslam_ref.geometry.cameras.interface import (
     RayJacobians,
     Rays,
     WorldProjectionJacobians,
-    as_points,
 )
 
 
@@ -68,7 +67,7 @@ class Camera:
     @classmethod
     def from_params(cls, params: ArrayLike) -> Self:
         """Camera from a vector in the order of ``names()``."""
-        values = as_points(params, len(cls.names()), f"params of {cls.__name__}")
+        values = as_array(f"params of {cls.__name__}", params, len(cls.names()))
         return cls(*values.tolist())
 
     @property

@@ -11,6 +11,7 @@ the axis::
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, NamedTuple
@@ -18,12 +19,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 from vslam_ref.geometry.cameras._batches import flatten, of
-from vslam_ref.geometry.cameras._roots import first_of, first_positive_root, solve_increasing
+from vslam_ref.geometry.cameras._roots import first_positive_root, for_each_lens, solve_increasing
 from vslam_ref.geometry.cameras._series import ARCTAN_SERIES, arctan_ratio
 from vslam_ref.geometry.cameras.camera import Camera
-from vslam_ref.geometry.cameras.interface import Distorted, DistortedJacobians, Lens, Rays, as_points
+from vslam_ref.geometry.cameras.interface import Distorted, DistortedJacobians, Lens, Rays
 
 LARGEST_ANGLE = np.pi - 1e-6
 """Straight behind the camera every direction of the image is the same point."""
@@ -44,7 +45,7 @@ class _Angle(NamedTuple):
 
 
 def _coefficients(k: ArrayLike) -> Array:
-    return as_points(k, 4, "k of the fisheye lens")
+    return as_array("k of the fisheye lens", k, 4)
 
 
 def _kappa(k: Array, p: Array) -> tuple[Array, Array]:
@@ -58,7 +59,7 @@ def _largest_angle_of(k: tuple[float, ...]) -> float:
     if not np.isfinite(k).all():
         return 0.0
     slope = [1.0, *(c * (2 * n + 3) for n, c in enumerate(k))]
-    return first_of([np.sqrt(first_positive_root(slope))], LARGEST_ANGLE)
+    return min(math.sqrt(first_positive_root(slope)), LARGEST_ANGLE)
 
 
 def field_angle(k: ArrayLike) -> Array:
@@ -74,16 +75,11 @@ def field_angle(k: ArrayLike) -> Array:
     >>> float(field_angle([-0.1, 0, 0, 0]))  # 1 - 0.3 theta^2 = 0
     1.825741858350...
     """
-    k = _coefficients(k)
-    if k.ndim == 1:
-        return np.asarray(_largest_angle_of(tuple(k.tolist())))
-    rows, which = np.unique(k.reshape(-1, 4), axis=0, return_inverse=True)
-    angles = np.array([_largest_angle_of(tuple(row)) for row in rows.tolist()])
-    return angles[which].reshape(k.shape[:-1])
+    return for_each_lens(_largest_angle_of, _coefficients(k))
 
 
 def _angle(k: Array, X_cam: ArrayLike) -> _Angle:
-    X = as_points(X_cam, 3, "X_cam")
+    X = as_array("X_cam", X_cam, 3)
     X = np.broadcast_to(X, (*np.broadcast_shapes(X.shape[:-1], k.shape[:-1]), 3))
     size = np.abs(X).max(axis=-1)
     valid = (size > _TINY) & (size < _HUGE)  # false for NaN
@@ -185,7 +181,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     >>> undistort([0, 0, 0, 0], [np.pi / 2, 0.0]).bearing.round(12)
     array([1., 0., 0.])
     """
-    batch = flatten(_coefficients(k), as_points(xd, 2, "xd"))
+    batch = flatten(_coefficients(k), as_array("xd", xd, 2))
     edge = np.broadcast_to(field_angle(k), batch.shape).ravel()
 
     def grow(theta: Array, at: IntArray) -> tuple[Array, Array]:

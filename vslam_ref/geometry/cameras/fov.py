@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.geometry.cameras._series import arctan_ratio, tan_ratio, tan_ratio_slope
 from vslam_ref.geometry.cameras.camera import Camera
 from vslam_ref.geometry.cameras.interface import (
@@ -27,7 +27,6 @@ from vslam_ref.geometry.cameras.interface import (
     DistortedJacobians,
     Lens,
     Rays,
-    as_points,
     normalise,
     normalise_jacobian,
     rays_through,
@@ -35,7 +34,7 @@ from vslam_ref.geometry.cameras.interface import (
 
 
 def _omega(k: ArrayLike) -> Array:
-    omega = as_points(k, 1, "k of the FOV lens")[..., 0]
+    omega = as_array("k of the FOV lens", k, 1)[..., 0]
     if not (np.abs(omega) < np.pi).all():
         raise ValueError("omega must lie between -pi and pi (its sign does not matter)")
     return omega
@@ -116,7 +115,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     array([1., 0.])
     """
     omega = _omega(k)
-    xd = as_points(xd, 2, "xd")
+    xd = as_array("xd", xd, 2)
     given: BoolArray = np.asarray((np.abs(xd) < 1e100).all(axis=-1))  # false for NaN
     xd = np.where(given[..., None], xd, 0.0)
     s = np.abs(omega) * np.hypot(xd[..., 0], xd[..., 1])

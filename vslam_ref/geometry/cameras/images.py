@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.geometry.cameras.camera import Camera
-from vslam_ref.geometry.cameras.interface import as_points
 
 
 class ImageMap(NamedTuple):
@@ -117,7 +116,7 @@ def sample_bilinear(image: NDArray[np.generic], uv: ArrayLike, fill: float = 0.0
     image = np.asarray(image)
     if image.ndim not in (2, 3) or 0 in image.shape:
         raise ValueError(f"image has shape {image.shape}; need (H, W) or (H, W, C), not empty")
-    uv = as_points(uv, 2, "uv")
+    uv = as_array("uv", uv, 2)
     height, width = image.shape[:2]
     u, v = uv[..., 0], uv[..., 1]
     inside = (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)

@@ -15,11 +15,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray
-
-IntArray = NDArray[np.intp]
+from vslam_ref.arrays import Array, BoolArray, as_array
 
 MAX_TAN = 1e6
 """Largest x/z and y/z of the models that go through the plane z = 1.
@@ -36,11 +34,6 @@ class Projection(NamedTuple):
     uv: Array
     valid: BoolArray
 
-    @property
-    def value(self) -> Array:
-        """The pixels."""
-        return self.uv
-
 
 class ProjectionJacobians(NamedTuple):
     """A projection with Jacobians in the point (..., 2, 3) and in all n intrinsics (..., 2, n)."""
@@ -49,11 +42,6 @@ class ProjectionJacobians(NamedTuple):
     valid: BoolArray
     J_point: Array
     J_intrinsics: Array
-
-    @property
-    def value(self) -> Array:
-        """The pixels."""
-        return self.uv
 
 
 class WorldProjectionJacobians(NamedTuple):
@@ -65,22 +53,12 @@ class WorldProjectionJacobians(NamedTuple):
     J_point: Array
     J_intrinsics: Array
 
-    @property
-    def value(self) -> Array:
-        """The pixels."""
-        return self.uv
-
 
 class Rays(NamedTuple):
     """Unit bearings in the camera's frame (..., 3) and whether the model has a ray for the pixel."""
 
     bearing: Array
     valid: BoolArray
-
-    @property
-    def value(self) -> Array:
-        """The bearings."""
-        return self.bearing
 
     @property
     def xn(self) -> Array:
@@ -95,22 +73,12 @@ class RayJacobians(NamedTuple):
     valid: BoolArray
     J_pixel: Array
 
-    @property
-    def value(self) -> Array:
-        """The bearings."""
-        return self.bearing
-
 
 class Distorted(NamedTuple):
     """Distorted normalised positions (..., 2) and whether the point is inside the lens's field (...)."""
 
     xd: Array
     valid: BoolArray
-
-    @property
-    def value(self) -> Array:
-        """The positions."""
-        return self.xd
 
 
 class DistortedJacobians(NamedTuple):
@@ -120,11 +88,6 @@ class DistortedJacobians(NamedTuple):
     valid: BoolArray
     J_point: Array
     J_lens: Array
-
-    @property
-    def value(self) -> Array:
-        """The positions."""
-        return self.xd
 
 
 class Lens(NamedTuple):
@@ -151,14 +114,6 @@ class Lens(NamedTuple):
     max_angle: Callable[[ArrayLike], float]
 
 
-def as_points(X: ArrayLike, axis: int, name: str) -> Array:
-    """Array of floats whose last axis has the given length, or ValueError."""
-    X = np.asarray(X, dtype=np.float64)
-    if X.ndim == 0 or X.shape[-1] != axis:
-        raise ValueError(f"{name} has shape {X.shape}; need (..., {axis})")
-    return X
-
-
 def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
     """Divide by the depth: xn (..., 2), zero where the point is not in front of the camera, and that flag.
 
@@ -170,7 +125,7 @@ def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
     (array([[0.25, 0.5 ],
            [0.  , 0.  ]]), array([ True, False]))
     """
-    X = as_points(X_cam, 3, "X_cam")
+    X = as_array("X_cam", X_cam, 3)
     z = X[..., 2]
     front = (z > MIN_DEPTH) & (z < np.inf)
     bound = MAX_TAN * np.where(front, z, 0.0)
@@ -181,7 +136,7 @@ def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
 
 def normalise_jacobian(X_cam: ArrayLike) -> DistortedJacobians:
     """:func:`normalise` with its Jacobian, in the form of a lens without parameters."""
-    X = as_points(X_cam, 3, "X_cam")
+    X = as_array("X_cam", X_cam, 3)
     xn, front = normalise(X)
     J = np.zeros((*front.shape, 2, 3))
     inverse_depth = np.where(front, 1.0 / np.where(front, X[..., 2], 1.0), 0.0)

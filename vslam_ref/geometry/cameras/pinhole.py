@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import BoolArray
+from vslam_ref.arrays import BoolArray, as_array
 from vslam_ref.geometry.cameras.camera import Camera
 from vslam_ref.geometry.cameras.interface import (
     MAX_TAN,
@@ -16,7 +16,6 @@ from vslam_ref.geometry.cameras.interface import (
     DistortedJacobians,
     Lens,
     Rays,
-    as_points,
     normalise,
     normalise_jacobian,
     rays_through,
@@ -41,7 +40,7 @@ def distort_jacobian(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
 
 def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     """Ray through a normalised position, shape (..., 2)."""
-    xd = as_points(xd, 2, "xd")
+    xd = as_array("xd", xd, 2)
     valid: BoolArray = np.all(np.abs(xd) < MAX_TAN, axis=-1)
     return rays_through(xd, valid)
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, as_array
+from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras.interface import (
     Lens,
     Projection,
@@ -17,13 +18,12 @@ from vslam_ref.geometry.cameras.interface import (
     RayJacobians,
     Rays,
     WorldProjectionJacobians,
-    as_points,
 )
 
 
 def _split(params: ArrayLike, lens: Lens) -> tuple[Array, Array, Array]:
     """Focal lengths (..., 2), centre (..., 2) and lens parameters (..., k)."""
-    params = as_points(params, 4 + len(lens.names), f"params (fx, fy, cx, cy, {', '.join(lens.names)})")
+    params = as_array(f"params (fx, fy, cx, cy, {', '.join(lens.names)})", params, 4 + len(lens.names))
     return params[..., :2], params[..., 2:4], params[..., 4:]
 
 
@@ -103,7 +103,7 @@ def unproject(params: ArrayLike, uv: ArrayLike, *, lens: Lens) -> Rays:
         Unit bearings; the optical axis where ``valid`` is False.
     """
     focal, centre, k = _split(params, lens)
-    return lens.undistort(k, (as_points(uv, 2, "uv") - centre) / focal)
+    return lens.undistort(k, (as_array("uv", uv, 2) - centre) / focal)
 
 
 def unproject_with_jacobians(params: ArrayLike, uv: ArrayLike, *, lens: Lens) -> RayJacobians:
@@ -155,10 +155,8 @@ def pixel_from_world_with_jacobians(
     """:func:`pixel_from_world` and its Jacobians in pose (left perturbation), world point and intrinsics."""
     X_cam = _cam_from_world(T_cam_world, X_world)
     at = project_with_jacobians(params, X_cam, lens=lens)
-    R_cam_world = np.asarray(T_cam_world, dtype=np.float64)[..., :3, :3]
-    return WorldProjectionJacobians(
-        at.uv, at.valid, pose_jacobian(at.J_point, X_cam), at.J_point @ R_cam_world, at.J_intrinsics
-    )
+    J_pose, J_world = pose_jacobian(at.J_point, X_cam), at.J_point @ se3.rotation(T_cam_world)
+    return WorldProjectionJacobians(at.uv, at.valid, J_pose, J_world, at.J_intrinsics)
 
 
 def pose_jacobian(J_point: ArrayLike, X_cam: ArrayLike) -> Array:
@@ -171,7 +169,7 @@ def pose_jacobian(J_point: ArrayLike, X_cam: ArrayLike) -> Array:
     Parameters
     ----------
     J_point : array_like, shape (..., m, 3)
-        Jacobian of anything in X_cam.  Where the point is not valid it is zero, and so is the result.
+        Jacobian of m quantities in X_cam.  Where the point is not valid it is zero, and so is the result.
     X_cam : array_like, shape (..., 3)
         Points in the camera's frame.
 
@@ -184,14 +182,10 @@ def pose_jacobian(J_point: ArrayLike, X_cam: ArrayLike) -> Array:
     >>> pose_jacobian([[1.0, 0.0, 0.0]], [0.0, 0.0, 2.0])
     array([[1., 0., 0., 0., 2., 0.]])
     """
-    J, X = np.asarray(J_point, dtype=np.float64), as_points(X_cam, 3, "X_cam")
+    J, X = np.asarray(J_point, dtype=np.float64), as_array("X_cam", X_cam, 3)
     X = np.where(np.isfinite(X), X, 0.0)  # such a point is not valid: its J is zero
     return np.concatenate([J, np.cross(np.broadcast_to(X[..., None, :], J.shape), J) + 0.0], -1)
 
 
 def _cam_from_world(T_cam_world: ArrayLike, X_world: ArrayLike) -> Array:
-    T, X = np.asarray(T_cam_world, dtype=np.float64), as_points(X_world, 3, "X_world")
-    if T.shape[-2:] != (4, 4):
-        raise ValueError(f"T_cam_world has shape {T.shape}; need (..., 4, 4)")
-    moved: Array = np.einsum("...ij,...j->...i", T[..., :3, :3], X) + T[..., :3, 3]
-    return moved
+    return se3.act(as_array("T_cam_world", T_cam_world, 4, 4), as_array("X_world", X_world, 3))

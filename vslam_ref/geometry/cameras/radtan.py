@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.geometry.cameras._batches import flatten, of
 from vslam_ref.geometry.cameras._radtan_inverse import may_have_a_ray, newton, radial_start
 from vslam_ref.geometry.cameras._radtan_terms import (
@@ -34,7 +34,6 @@ from vslam_ref.geometry.cameras.interface import (
     DistortedJacobians,
     Lens,
     Rays,
-    as_points,
     normalise,
     normalise_jacobian,
     rays_through,
@@ -132,7 +131,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
            [0.        , 0.        , 1.        ]]), valid=array([ True, False]))
     """
     radius = field_radius(k)
-    batch = flatten(np.asarray(k, dtype=np.float64), as_points(xd, 2, "xd"))
+    batch = flatten(np.asarray(k, dtype=np.float64), as_array("xd", xd, 2))
     radius = np.broadcast_to(radius, batch.shape).ravel()
     at = np.flatnonzero(may_have_a_ray(batch.k, batch.xd, radius))
     k, target, radius = of(batch.k, at), batch.xd[at], radius[at]
