@@ -314,12 +314,12 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample({"problem.bin": bundle_samples.libmv_bytes(">", b"N")}, binary=True, check=bundle_wrong),
     ],
     "bundle_files.colmap.reading:read_colmap": [Sample(_COLMAP, check=bundle_wrong)],
-    "bundle_files.anything:read_bundle": [
+    "bundle_files.by_content:read_bundle": [
         Sample(_one("problem", _BAL), check=bundle_wrong),
         Sample({"problem": _LIBMV}, binary=True, check=bundle_wrong),
         Sample(_one("problem", _BUNDLER), check=bundle_wrong),
     ],
-    "bundle_files.anything:detect": [Sample({"problem.bz2": bz2.compress(_BAL.encode())}, binary=True)],
+    "bundle_files.by_content:detect": [Sample({"problem.bz2": bz2.compress(_BAL.encode())}, binary=True)],
     "calibration_files.euroc:read_euroc": [Sample(_one("sensor.yaml", SENSOR), check=camera_wrong)],
     "calibration_files.kalibr:read_kalibr": [Sample(_one("camchain.yaml", KALIBR), check=camera_wrong)],
     "calibration_files.opencv_yaml:read_opencv": [Sample(_one("camera.yaml", OPENCV), check=camera_wrong)],
@@ -371,7 +371,7 @@ SAMPLES: dict[str, list[Sample]] = {
 }
 
 BLOCKS = {
-    "calibration_files.yaml_nodes:read_yaml": "answers with a tree that the readers of calibrations judge",
+    "yaml_nodes:read_yaml": "answers with a tree that the readers of calibrations judge",
     "numbers:read_numbers": "is given bytes; the readers of BAL and Bundler use it",
     "text:read_bytes": "any bytes are right",
     "text:read_text": "any text is right",

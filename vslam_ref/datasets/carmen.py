@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.datasets.text import MAX_BYTES, FormatError, number, read_lines
+from vslam_ref.datasets.text import MAX_BYTES, FormatError, is_number, number, read_lines
 from vslam_ref.grids.scan import LaserScanner, Scan
 
 SCAN = "FLASER"
@@ -153,9 +153,5 @@ def _readings(path: Path, line: int, words: list[str]) -> Array:
     try:
         return np.array([float(word) for word in words])
     except ValueError:
-        for k, word in enumerate(words):
-            try:
-                float(word)
-            except ValueError:
-                raise FormatError(path, line, f"reading {k + 1} is {word!r}; expected a number") from None
-        raise  # cannot be: one of the words was no number
+        k, word = next((k, word) for k, word in enumerate(words, 1) if not is_number(word))
+        raise FormatError(path, line, f"reading {k} is {word!r}; expected a number") from None

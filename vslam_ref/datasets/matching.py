@@ -112,20 +112,14 @@ def tracks(features: Sequence[Features], pairs: Mapping[tuple[int, int], IntArra
         Of two pictures and more.  A chain that comes to two places of one picture is wrong somewhere, and
         is left out as a whole.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     first = np.concatenate([[0], np.cumsum([len(f.uv) for f in features])]).astype(np.int64)
-    parent = np.arange(first[-1])
-
-    def root(k: int) -> int:
-        while parent[k] != k:
-            parent[k] = parent[parent[k]]
-            k = int(parent[k])
-        return k
-
-    for (i, j), found in sorted(pairs.items()):
-        for p, q in found:
-            a, b = root(int(first[i] + p)), root(int(first[j] + q))
-            parent[max(a, b)] = min(a, b)
-    group = np.array([root(k) for k in range(len(parent))], dtype=np.int64)
+    links = [first[[i, j]] + found for (i, j), found in pairs.items()]
+    a, b = np.concatenate([np.zeros((0, 2), np.int64), *links]).T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(first[-1], first[-1]))
+    _, group = connected_components(graph, directed=False)  # numbered by their first places
     picture = np.repeat(np.arange(len(features)), np.diff(first))
     uv = np.concatenate([f.uv for f in features]) if len(features) else np.zeros((0, 2))
     _, row, size = np.unique(group, return_inverse=True, return_counts=True)

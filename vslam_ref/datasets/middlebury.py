@@ -56,8 +56,6 @@ def read_cameras(path: Path) -> Cameras:
         If the count disagrees, a line has not 22 columns, a word is no finite number, a name is a path or
         comes twice, K has a skew or no positive focal length, or R is no rotation.
     """
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
     lines = list(read_lines(path, MAX_BYTES))
     if not lines:
         raise FormatError(path, None, "empty; expected the number of pictures, then a line for each")

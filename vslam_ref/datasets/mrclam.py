@@ -84,11 +84,10 @@ def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
     subjects = require_integers(marks, 0, "subject")
     _require_distinct(marks, subjects, "subject")
     known = set(read_barcodes(folder).values())
-    for line, subject in zip(marks.lines.tolist(), subjects.tolist(), strict=True):
-        if subject not in known:
-            raise FormatError(
-                marks.path, line, f"landmark {subject} has no barcode; expected one of Barcodes.dat"
-            )
+    marks.require(
+        np.isin(subjects, list(known)),
+        lambda k: f"landmark {subjects[k]} has no barcode; expected one of Barcodes.dat",
+    )
     pose = poses.values[:, 1:].copy()
     pose[:, 2] = so2.wrap(pose[:, 2])
     return Truth(
@@ -112,11 +111,12 @@ def read_barcodes(folder: Path) -> dict[int, int]:
 
 
 def _require_distinct(table: Columns, values: IntArray, name: str) -> None:
-    seen: dict[int, int] = {}
-    for line, value in zip(table.lines.tolist(), values.tolist(), strict=True):
-        if value in seen:
-            raise FormatError(table.path, line, f"{name} {value} again; line {seen[value]} has it already")
-        seen[value] = line
+    _, first, which = np.unique(values, return_index=True, return_inverse=True)
+    before = first[which]  # where each value stands first
+    table.require(
+        before == np.arange(len(values)),
+        lambda k: f"{name} {values[k]} again; line {table.lines[before[k]]} has it already",
+    )
 
 
 def _read_sightings(folder: Path, robot: int, start: float) -> tuple[tuple[Sighting, ...], dict[str, int]]:
@@ -143,14 +143,12 @@ def _read_sightings(folder: Path, robot: int, start: float) -> tuple[tuple[Sight
 
 def _require_sane(table: Columns) -> None:
     """Ranges are positive and bearings less than a right angle: the cameras look ahead."""
-    for column, name, right, bad in (
-        (2, "range", "more than 0 m", table.values[:, 2] <= 0),
-        (3, "bearing", "radians between -1.57 and 1.57", np.abs(table.values[:, 3]) >= np.pi / 2),
-    ):
-        at = np.flatnonzero(bad)
-        if len(at):
-            what = f"{name} is {table.values[at[0], column]:g}; expected {right}"
-            raise FormatError(table.path, int(table.lines[at[0]]), what)
+    r, bearing = table.values[:, 2:].T
+    table.require(r > 0, lambda k: f"range is {r[k]:g}; expected more than 0 m")
+    table.require(
+        np.abs(bearing) < np.pi / 2,
+        lambda k: f"bearing is {bearing[k]:g}; expected radians between -1.57 and 1.57",
+    )
 
 
 def group_sightings(times: Array, ids: IntArray, polar: Array) -> tuple[Sighting, ...]:

@@ -77,8 +77,6 @@ def read_problem(path: Path) -> NistProblem:
     FormatError
         If a part is missing, a count disagrees, or a number is none, with file and line.
     """
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
     lines = dict(read_lines(path, MAX_BYTES))
     for at, text in lines.items():
         if len(text) > LONGEST_LINE:

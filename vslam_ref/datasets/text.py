@@ -10,13 +10,13 @@ import bz2
 import gzip
 import math
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple, cast
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 
 MAX_BYTES = 64 * 2**20
 """Unpacked size at which reading stops; the largest known log of this kind has 3 MiB."""
@@ -61,6 +61,13 @@ class Columns(NamedTuple):
     path: Path
     values: Array
     lines: IntArray
+
+    def require(self, good: BoolArray, what: Callable[[int], str]) -> None:
+        """Raise :class:`FormatError` at the first row that is not good; ``what(row)`` says what is wrong."""
+        bad = np.flatnonzero(~good)
+        if len(bad):
+            row = int(bad[0])
+            raise FormatError(self.path, int(self.lines[row]), what(row))
 
 
 def existing(folder: Path, name: str) -> Path:
@@ -123,7 +130,11 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     FormatError
         As :func:`read_bytes`, and on bytes that are no text.
     """
-    data = read_bytes(path, max_bytes)
+    return decoded(path, read_bytes(path, max_bytes))
+
+
+def decoded(path: Path, data: bytes) -> str:
+    """Text of a file's bytes without a byte order mark, or :class:`FormatError` where they are none."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -161,6 +172,15 @@ def number(path: Path, line: int, word: str, name: str) -> float:
     return value
 
 
+def is_number(word: str) -> bool:
+    """Whether Python reads a word as a number, finite or not."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def read_columns(path: Path, names: Sequence[str]) -> Columns:
     """Read a table of finite numbers, one row a line, separated by blanks.
 
@@ -195,21 +215,20 @@ def require_order(table: Columns, column: int, *, strict: bool = False) -> None:
 
     With ``strict``, equal times are refused too.
     """
-    step = np.diff(table.values[:, column])
-    bad = np.flatnonzero(step <= 0 if strict else step < 0)
-    if len(bad):
-        at = int(bad[0]) + 1
-        before, now = table.values[at - 1, column], table.values[at, column]
-        what = f"time {now:.3f} s after {before:.3f} s; times must not go back"
-        raise FormatError(table.path, int(table.lines[at]), what)
+    times = table.values[:, column]
+    step = np.diff(times, prepend=-np.inf)
+    table.require(
+        step > 0 if strict else step >= 0,
+        lambda k: f"time {times[k]:.3f} s after {times[k - 1]:.3f} s; times must not go back",
+    )
 
 
 def require_integers(table: Columns, column: int, name: str) -> IntArray:
     """Return a column as integers, or raise :class:`FormatError` at the first that is none."""
     values = table.values[:, column]
-    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) >= LARGEST_INTEGER))
-    if len(bad):
-        at = int(bad[0])
-        right = "an integer" if abs(values[at]) < LARGEST_INTEGER else "an integer below 9e15"
-        raise FormatError(table.path, int(table.lines[at]), f"{name} is {values[at]:g}; expected {right}")
+    small = np.abs(values) < LARGEST_INTEGER
+    table.require(
+        (values == np.round(values)) & small,
+        lambda k: f"{name} is {values[k]:g}; expected an integer{'' if small[k] else ' below 9e15'}",
+    )
     return values.astype(np.int64)

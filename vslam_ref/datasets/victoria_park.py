@@ -124,8 +124,6 @@ def match_times(times: Array, speed: Array, graph: GraphFile, path: Path) -> Arr
 
 def read_graph(path: Path) -> GraphFile:
     """Read the pose graph file."""
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
     numbers, ways = [0], [0.0]
     rows: list[tuple[int, int, float, float]] = []
     index = {0: 0}

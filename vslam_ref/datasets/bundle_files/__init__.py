@@ -16,9 +16,9 @@ the file's size before anything is made for them, and archives are unpacked up t
 once, cameras without points and points behind cameras are no errors here: the adjustment names them.
 """
 
-from vslam_ref.datasets.bundle_files.anything import detect, read_bundle, write_bundle
 from vslam_ref.datasets.bundle_files.bal import read_bal, write_bal
 from vslam_ref.datasets.bundle_files.bundler import read_bundler
+from vslam_ref.datasets.bundle_files.by_content import detect, read_bundle, write_bundle
 from vslam_ref.datasets.bundle_files.colmap import read_colmap, write_colmap
 from vslam_ref.datasets.bundle_files.libmv import read_libmv
 from vslam_ref.datasets.bundle_files.ply import write_ply

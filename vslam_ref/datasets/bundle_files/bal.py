@@ -8,7 +8,7 @@ A text of numbers, plain, ``.gz`` or ``.bz2``; line ends mean nothing::
     x y z                               one point each
 
 The camera looks along -z with y up, and the origin of the pixels is the principal point; see
-:mod:`~vslam_ref.datasets.bundle_files.looking_back`.  Each camera has a set of intrinsics of its own, of
+:mod:`~vslam_ref.datasets.bundle_files.opengl_cameras`.  Each camera has a set of intrinsics of its own, of
 which f, k1 and k2 may move.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, load, require_once, require_room
-from vslam_ref.datasets.bundle_files.looking_back import DOWN, FLIP, free, scene
+from vslam_ref.datasets.bundle_files.opengl_cameras import DOWN, FLIP, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.numbers import Numbers, read_numbers
 from vslam_ref.datasets.text import FormatError

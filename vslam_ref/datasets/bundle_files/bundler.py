@@ -7,7 +7,7 @@ Below the comment ``# Bundle file v0.3`` a row of numbers, line ends mean nothin
     x y z   red green blue   n   n times: camera key u v      one point each
 
 Cameras look along -z with y up, and the origin of the pixels is the image's centre; see
-:mod:`~vslam_ref.datasets.bundle_files.looking_back`.  The key is the number of the feature in its image; it
+:mod:`~vslam_ref.datasets.bundle_files.opengl_cameras`.  The key is the number of the feature in its image; it
 is passed over.
 
 A camera with f = 0 is one that Bundler could not place.  It is left out, and so is what it saw;
@@ -30,7 +30,7 @@ from vslam_ref.datasets.bundle_files.loading import (
     require_room,
     rotations,
 )
-from vslam_ref.datasets.bundle_files.looking_back import DOWN, free, scene
+from vslam_ref.datasets.bundle_files.opengl_cameras import DOWN, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.numbers import Numbers, read_numbers
 from vslam_ref.datasets.text import FormatError, read_lines

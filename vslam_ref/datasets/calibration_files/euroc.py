@@ -17,11 +17,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
-from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files.record import CameraFile
-from vslam_ref.datasets.calibration_files.yaml_nodes import build, read_yaml, rigid
+from vslam_ref.datasets.yaml_nodes import build, read_yaml, rigid
+from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Fisheye, Radtan
 
 MODELS: dict[str, type[Camera]] = {
@@ -43,23 +41,10 @@ def read_euroc(path: Path | str) -> CameraFile:
     for key, right in (("sensor_type", "camera"), ("camera_model", "pinhole")):
         if top.get(key).text() != right:
             raise top.get(key).error(f"{key} is {top.get(key).text()!r}; expected {right!r}")
-    lens = top.get("distortion_model")
-    if lens.text() not in MODELS:
-        raise lens.error(f"distortion_model is {lens.text()!r}; expected one of {', '.join(MODELS)}")
-    size = top.get("resolution").elements()
-    if len(size) != 2:
-        raise top.get("resolution").error(f"resolution has {len(size)} numbers; expected width and height")
+    model = top.get("distortion_model").choice(MODELS)
     intrinsics = top.get("intrinsics")
     k = top.get("distortion_coefficients").vector(4)
-    camera: Camera = build(intrinsics, MODELS[lens.text()], *intrinsics.vector(4).tolist(), *k.tolist())
+    camera: Camera = build(intrinsics, model, *intrinsics.vector(4).tolist(), *k.tolist())
     T_rig_cam = rigid(top.get("T_BS"), top.get("T_BS").matrix())
     name = top.items()["comment"].text() if "comment" in top.items() else ""
-    return CameraFile(camera, (size[0].integer(), size[1].integer()), inverse(T_rig_cam), name)
-
-
-def inverse(T: Array) -> Array:
-    """Inverse of a rigid motion, its rotation transposed."""
-    R, t = T[:3, :3], T[:3, 3]
-    out = np.eye(4)
-    out[:3, :3], out[:3, 3] = R.T, -R.T @ t
-    return out
+    return CameraFile(camera, top.get("resolution").size(), se3.inverse(T_rig_cam), name)

@@ -21,7 +21,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files.record import CameraFile
-from vslam_ref.datasets.calibration_files.yaml_nodes import Node, build, read_yaml, rigid
+from vslam_ref.datasets.yaml_nodes import Node, build, read_yaml, rigid
 from vslam_ref.geometry.cameras import Camera, Fisheye, Fov, Pinhole, Radtan
 
 MODELS: dict[str, tuple[type[Camera], int]] = {
@@ -52,7 +52,8 @@ def read_kalibr(path: Path | str) -> tuple[CameraFile, ...]:
     for name in names:
         node = entries[name]
         before = _pose(node, before, first=not found)
-        found.append(CameraFile(_camera(node), _size(node), before, name))
+        size = node.get("resolution").size() if "resolution" in node.items() else None
+        found.append(CameraFile(_camera(node), size, before, name))
     return tuple(found)
 
 
@@ -61,26 +62,14 @@ def _camera(node: Node) -> Camera:
     if kind.text() != "pinhole":
         raise kind.error(f"camera_model is {kind.text()!r}; only pinhole is known here")
     intrinsics = node.get("intrinsics")
-    lens = node.get("distortion_model")
-    if lens.text() not in MODELS:
-        raise lens.error(f"distortion_model is {lens.text()!r}; expected one of {', '.join(MODELS)}")
-    make, count = MODELS[lens.text()]
+    make, count = node.get("distortion_model").choice(MODELS)
     k = node.get("distortion_coeffs").vector(count).tolist() if count else []
     camera: Camera = build(intrinsics, make, *intrinsics.vector(4).tolist(), *k)
     return camera
 
 
-def _size(node: Node) -> tuple[int, int] | None:
-    if "resolution" not in node.items():
-        return None
-    words = node.get("resolution").elements()
-    if len(words) != 2:
-        raise node.get("resolution").error(f"resolution has {len(words)} numbers; expected width and height")
-    return words[0].integer(), words[1].integer()
-
-
 def _pose(node: Node, before: Array | None, *, first: bool) -> Array | None:
-    """T_cam_rig: told, or chained from the camera before."""
+    """T_cam_rig: given, or chained from the camera before."""
     entries = node.items()
     if "T_cam_imu" in entries:
         return rigid(entries["T_cam_imu"], entries["T_cam_imu"].matrix())

@@ -19,7 +19,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files.record import CameraFile
-from vslam_ref.datasets.calibration_files.yaml_nodes import Node, build, read_yaml
+from vslam_ref.datasets.yaml_nodes import Node, build, read_yaml
 from vslam_ref.geometry.cameras import MODELS, Camera
 from vslam_ref.support.files import write_bytes
 

@@ -48,8 +48,6 @@ def read_tum_mono(path: Path | str) -> TumMonoFile:
         Where it is not as the module says.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
     lines = list(read_lines(path))
     if len(lines) != 4:
         raise FormatError(path, lines[-1][0] if lines else None, f"{len(lines)} lines; expected 4: {LINES}")

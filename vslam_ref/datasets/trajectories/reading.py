@@ -89,11 +89,13 @@ def read_kitti(path: Path) -> TrajectoryFile:
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation either
         off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max((1, 2))
         off[np.linalg.det(R) < 0] = 2.0  # a mirror
-    bad = np.flatnonzero(~(off <= UNIT_TOLERANCE))
-    if len(bad):
-        what = f"not a rotation matrix (R^T R is {off[bad[0]]:.3g} off the identity, or det R < 0)"
-        right = "expected 12 numbers of one pose, row by row"
-        raise FormatError(path, int(table.lines[bad[0]]), f"{what}; {right}")
+    table.require(
+        off <= UNIT_TOLERANCE,
+        lambda k: (
+            f"not a rotation matrix (R^T R is {off[k]:.3g} off the identity, or det R < 0); "
+            "expected 12 numbers of one pose, row by row"
+        ),
+    )
     trajectory = Trajectory(None, _positions(table, (3, 7, 11)), R)
     return TrajectoryFile(trajectory, "kitti", AsRead(), float(off.max()), 0)
 
@@ -137,11 +139,8 @@ def _nanoseconds(path: Path, line: int, word: str) -> int:
 
 def _positions(table: Columns, columns: tuple[int, int, int]) -> Array:
     positions: Array = table.values[:, columns].copy()
-    bad = np.argwhere(np.abs(positions) >= LONGEST)
-    if len(bad):
-        row, axis = (int(i) for i in bad[0])
-        what = f"t{'xyz'[axis]} is {positions[row, axis]:g} m; expected less than {LONGEST:g}"
-        raise FormatError(table.path, int(table.lines[row]), what)
+    for axis, t in zip("xyz", positions.T, strict=True):
+        table.require(np.abs(t) < LONGEST, lambda k: f"t{axis} is {t[k]:g} m; expected less than {LONGEST:g}")
     return positions
 
 
@@ -149,18 +148,17 @@ def _require_times(table: Columns, exact: IntArray | None = None) -> int:
     """Count times that repeat the one above; refuse times that go back, and too many repetitions."""
     times = table.values[:, 0]
     step = np.diff(times if exact is None else exact)
-    same, back = np.flatnonzero(step == 0), np.flatnonzero(step < 0)
-    if len(back):
-        at = int(back[0]) + 1
-        what = f"time {times[at]:.9f} s after {times[at - 1]:.9f} s; times must not go back"
-        raise FormatError(table.path, int(table.lines[at]), what)
-    if len(same) > REPEATED_SHARE * len(times):
-        at = int(same[0]) + 1
-        what = (
-            f"time {times[at]:.9f} s again; line {table.lines[at - 1]} has it already, expected a later one"
+    after = np.concatenate([[1], step])
+    table.require(
+        after >= 0, lambda k: f"time {times[k]:.9f} s after {times[k - 1]:.9f} s; times must not go back"
+    )
+    same = after == 0
+    if same.sum() > REPEATED_SHARE * len(times):
+        has, right = "has it already", "expected a later one"
+        table.require(
+            ~same, lambda k: f"time {times[k]:.9f} s again; line {table.lines[k - 1]} {has}, {right}"
         )
-        raise FormatError(table.path, int(table.lines[at]), what)
-    return len(same)
+    return int(same.sum())
 
 
 def _rotations(table: Columns, q: Array) -> tuple[Array, float]:
@@ -168,8 +166,8 @@ def _rotations(table: Columns, q: Array) -> tuple[Array, float]:
     with np.errstate(over="ignore"):
         length = np.linalg.norm(q, axis=1)
     off = np.abs(length - 1.0)
-    bad = np.flatnonzero(~(off <= UNIT_TOLERANCE))
-    if len(bad):
-        what = f"quaternion of length {length[bad[0]]:.6g}; expected 1 within {UNIT_TOLERANCE:g}"
-        raise FormatError(table.path, int(table.lines[bad[0]]), what)
+    table.require(
+        off <= UNIT_TOLERANCE,
+        lambda k: f"quaternion of length {length[k]:.6g}; expected 1 within {UNIT_TOLERANCE:g}",
+    )
     return matrices(q), float(off.max())

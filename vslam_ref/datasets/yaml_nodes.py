@@ -5,19 +5,20 @@ OpenCV begins its files with ``%YAML:1.0``, which no YAML standard knows; that l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import FormatError, number
+from vslam_ref.datasets.text import FormatError, decoded, number
 
+T = TypeVar("T")
 MAX_BYTES = 2**20
 LONGEST = 1e12
 MAX_DEPTH = 32
-"""Calibration files are flat and short: what is larger or deeper is something else."""
+"""Calibration and map files are flat and short: what is larger or deeper is another kind of file."""
 
 
 class Node(NamedTuple):
@@ -74,6 +75,19 @@ class Node(NamedTuple):
         if not value.is_integer() or not least <= value < 2**31:
             raise self.error(f"{self.name} is {self.text()!r}; expected a whole number, at least {least}")
         return int(value)
+
+    def choice(self, options: Mapping[str, T]) -> T:
+        """What a word stands for, or FormatError that lists the words."""
+        if self.text() not in options:
+            raise self.error(f"{self.name} is {self.text()!r}; expected one of {', '.join(options)}")
+        return options[self.text()]
+
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        words = self.elements()
+        if len(words) != 2:
+            raise self.error(f"{self.name} has {len(words)} numbers; expected width and height")
+        return words[0].integer(), words[1].integer()
 
     def elements(self) -> list[Node]:
         """Elements of a list."""
@@ -142,15 +156,11 @@ def _read_text(path: Path) -> str:
     with path.open("rb") as stream:
         data = stream.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
-        raise FormatError(path, None, f"more than {MAX_BYTES} bytes; is this a calibration?")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise FormatError(path, line, "not a text file; UTF-8 expected") from None
+        raise FormatError(path, None, f"more than {MAX_BYTES} bytes; is this the right file?")
+    text = decoded(path, data)
     for line, depth in _depths(text):
         if depth > MAX_DEPTH:
-            raise FormatError(path, line, f"nested more than {MAX_DEPTH} deep; is this a calibration?")
+            raise FormatError(path, line, f"nested more than {MAX_DEPTH} deep; is this the right file?")
     return "#" + text[1:] if text.startswith("%YAML") else text
 
 
