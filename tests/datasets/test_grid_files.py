@@ -62,12 +62,12 @@ def test_negated_and_pgm_pictures_are_read(tmp_path: Path, grid: LogOddsGrid) ->
     ("old", "new", "what"),
     [
         ("resolution: 0.1", "resolution: 0", "resolution is 0; expected more than 0"),
-        ("resolution: 0.1", "resolution: .nan", "resolution is nan; expected a finite number"),
-        ("resolution: 0.1", "nothing: 1", "resolution is None"),
+        ("resolution: 0.1", "resolution: .nan", "resolution is '.nan'; expected a number"),
+        ("resolution: 0.1", "nothing: 1", "has no resolution"),
         ("0.0]", "0.5]", "expected [x, y, 0.0]"),
         ("origin: [", "origin: [1, ", "expected [x, y, 0.0]"),
         ("origin: [-0.7", "origin: [-0.73", "expected multiples of the resolution"),
-        ("negate: 0", "negate: maybe", "negate is 'maybe'; expected 0 or 1"),
+        ("negate: 0", "negate: maybe", "negate is 'maybe'; expected one of 0, 1"),
         ("m.png", "other.png", "image is 'other.png'; expected a picture beside"),
         ("m.png", "m.yaml", "not a picture"),
     ],
@@ -82,7 +82,8 @@ def test_a_damaged_map_is_answered(tmp_path: Path, grid: LogOddsGrid, old: str, 
 
 
 @pytest.mark.parametrize(
-    ("content", "what"), [(b"a: [", "not YAML"), (b"- 1", "no keys"), (b"#" * 70000, "more than")]
+    ("content", "what"),
+    [(b"a: [", "expected YAML"), (b"- 1", "is a list; expected entries"), (b"#" * 2**21, "more than")],
 )
 def test_what_is_no_yaml_is_refused(tmp_path: Path, content: bytes, what: str) -> None:
     (tmp_path / "m.yaml").write_bytes(content)

@@ -18,7 +18,6 @@ decided cell decided and every other undecided.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +25,13 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.picture_size import require_size
 from vslam_ref.datasets.text import FormatError
+from vslam_ref.datasets.yaml_nodes import Node, read_yaml
 from vslam_ref.grids.lattice import MAX_CELLS, Lattice
 from vslam_ref.grids.log_odds import DECIDED, LogOddsGrid, log_odds
 
 Bytes = NDArray[np.uint8]
-MAX_YAML = 64 * 1024
+LARGEST = 1e15
+"""Of a number in the YAML; the lattice counts cells in whole numbers."""
 
 
 def grey(grid: LogOddsGrid) -> Bytes:
@@ -76,79 +77,42 @@ def read_ros_map(path: Path) -> LogOddsGrid:
         If the YAML lacks a key or holds a wrong value, if the picture is missing or none, or if the origin
         is turned or not on the lattice of the resolution.
     """
-    about = _yaml(path)
-    resolution = _number(path, about, "resolution")
-    origin = about.get("origin")
-    if (
-        not isinstance(origin, list)
-        or len(origin) != 3
-        or not all(_is_number(v) for v in origin)
-        or origin[2] != 0
-    ):
-        raise FormatError(path, None, f"origin is {origin!r}; expected [x, y, 0.0]")
-    if about.get("negate") not in (0, 1):
-        raise FormatError(path, None, f"negate is {about.get('negate')!r}; expected 0 or 1")
-    picture = _picture(path, about.get("image"))
+    top = read_yaml(path)
+    resolution, at = top.get("resolution").number(), top.get("origin")
+    if not 0 < resolution < LARGEST:
+        raise top.get("resolution").error(f"resolution is {resolution:g}; expected more than 0")
+    origin = at.vector()
+    if len(origin) != 3 or origin[2] != 0 or not (np.abs(origin) < LARGEST).all():
+        raise at.error(f"origin is {origin.tolist()}; expected [x, y, 0.0]")
+    negate = top.get("negate").choice({"0": False, "1": True})
+    picture = _picture(top.get("image"))
     p = picture[::-1] / 255.0
-    p = p if about["negate"] else 1.0 - p
-    if not resolution > 0:
-        raise FormatError(path, None, f"resolution is {resolution:g}; expected more than 0")
-    corner = [v / resolution for v in origin[:2]]
-    whole = [round(v) for v in corner]
-    if max(abs(a - b) for a, b in zip(corner, whole, strict=True)) > 1e-6:
-        raise FormatError(path, None, f"origin is {origin!r}; expected multiples of the resolution")
-    shape = (picture.shape[0], picture.shape[1])
+    corner = origin[:2] / resolution
+    if np.abs(corner - np.round(corner)).max() > 1e-6:
+        raise at.error(f"origin is {origin.tolist()}; expected multiples of the resolution")
+    first = tuple(int(v) for v in np.round(corner))
     least = 0.5 / 255.0
-    return LogOddsGrid(
-        Lattice(resolution, (whole[0], whole[1]), shape), log_odds(np.clip(p, least, 1.0 - least))
-    )
+    lattice = Lattice(resolution, (first[0], first[1]), (picture.shape[0], picture.shape[1]))
+    return LogOddsGrid(lattice, log_odds(np.clip(p if negate else 1.0 - p, least, 1.0 - least)))
 
 
-def _yaml(path: Path) -> dict[str, Any]:
-    import yaml
-
-    with path.open("rb") as stream:
-        data = stream.read(MAX_YAML + 1)
-    if len(data) > MAX_YAML:
-        raise FormatError(path, None, f"more than {MAX_YAML} bytes; is this a map's YAML?")
-    try:
-        about = yaml.safe_load(data.decode("utf-8"))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # an impossible date is a ValueError
-        mark = getattr(error, "problem_mark", None)
-        raise FormatError(path, mark.line + 1 if mark else None, "not YAML; expected a map's file") from None
-    if not isinstance(about, dict):
-        raise FormatError(path, None, "no keys; expected image, resolution, origin, negate")
-    return about
-
-
-def _is_number(value: Any) -> bool:
-    """Whether it is a number of a size that a map may have; NaN is none."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and -1e15 < value < 1e15
-
-
-def _number(path: Path, about: dict[str, Any], key: str) -> float:
-    value = about.get(key)
-    if not _is_number(value):
-        raise FormatError(path, None, f"{key} is {value!r}; expected a finite number")
-    return float(value)  # type: ignore[arg-type]
-
-
-def _picture(path: Path, name: Any) -> Array:
+def _picture(node: Node) -> Array:
     import cv2
 
+    path = node.path.parent / node.text()
     try:
-        there = isinstance(name, str) and (path.parent / name).is_file()
-    except OSError:  # a name that no file can have
+        there = path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
         there = False
     if not there:
-        raise FormatError(path, None, f"image is {name!r}; expected a picture beside the YAML")
-    require_size(path.parent / name, MAX_CELLS)
+        raise node.error(f"image is {node.text()!r}; expected a picture beside the YAML")
+    require_size(path, MAX_CELLS)
     try:
-        picture = cv2.imdecode(np.fromfile(path.parent / name, np.uint8), cv2.IMREAD_GRAYSCALE)
+        picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error:  # empty, or too large for OpenCV
         picture = None
     if picture is None:
-        raise FormatError(path.parent / name, None, "not a picture; expected PNG or PGM")
+        raise FormatError(path, None, "not a picture; expected PNG or PGM")
     if picture.size > MAX_CELLS:
-        raise FormatError(path.parent / name, None, f"{picture.size} pixels; at most {MAX_CELLS}")
+        raise FormatError(path, None, f"{picture.size} pixels; at most {MAX_CELLS}")
     return np.asarray(picture, dtype=np.float64)

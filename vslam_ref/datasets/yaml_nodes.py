@@ -77,10 +77,11 @@ class Node(NamedTuple):
         return int(value)
 
     def choice(self, options: Mapping[str, T]) -> T:
-        """What a word stands for, or FormatError that lists the words."""
-        if self.text() not in options:
+        """What a word (in any case, blanks around it) stands for, or FormatError that lists the words."""
+        word = self.text().strip().lower()
+        if word not in options:
             raise self.error(f"{self.name} is {self.text()!r}; expected one of {', '.join(options)}")
-        return options[self.text()]
+        return options[word]
 
     def size(self) -> tuple[int, int]:
         """Width and height."""

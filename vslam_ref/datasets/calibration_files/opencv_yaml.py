@@ -63,11 +63,10 @@ def read_opencv(
         top.get(distortion)
     coefficients = _coefficients(entries[names[0]]) if names else np.zeros(0)
     at = entries[names[0]] if names else node
-    name = model or _told_model(entries) or _model_of(coefficients)
+    name = model or _named_model(entries) or _model_of(coefficients)
     camera = _camera(at, name, sensor, coefficients)
-    return CameraFile(
-        camera, _size(entries), name=entries["camera_name"].text() if "camera_name" in entries else ""
-    )
+    title = entries["camera_name"].text() if "camera_name" in entries else ""
+    return CameraFile(camera, _size(entries), name=title)
 
 
 def _sensor(node: Node) -> Array:
@@ -77,9 +76,8 @@ def _sensor(node: Node) -> Array:
         raise node.error(f"{node.name} is {K.shape[0]} x {K.shape[1]}; expected 3 x 3")
     wanted = np.array([[K[0, 0], 0, K[0, 2]], [0, K[1, 1], K[1, 2]], [0, 0, 1.0]])
     if not np.array_equal(K, wanted):
-        raise node.error(
-            f"{node.name} has other numbers than fx, fy, cx, cy; expected 0 there and 1 at the end"
-        )
+        what = "has other numbers than fx, fy, cx, cy; expected 0 there and 1 at the end"
+        raise node.error(f"{node.name} {what}")
     return K[[0, 1, 0, 1], [0, 1, 2, 2]]
 
 
@@ -89,21 +87,16 @@ def _coefficients(node: Node) -> Array:
     if len(values) in (12, 14) and not values[8:].any():
         values = values[:8]
     if len(values) > 8:
-        raise node.error(
-            f"{node.name} has {len(values)} numbers; no thin prism or tilt here, expected up to 8"
-        )
+        what = f"has {len(values)} numbers; no thin prism or tilt here, expected up to 8"
+        raise node.error(f"{node.name} {what}")
     return values
 
 
-def _told_model(entries: dict[str, Node]) -> str | None:
+def _named_model(entries: dict[str, Node]) -> str | None:
     """Model that the file names, by our name."""
     for key in ("camera_model", "distortion_model"):
         if key in entries:
-            word = entries[key].text().strip().lower()
-            name = SYNONYMS.get(word, word)
-            if name in MODELS:
-                return name
-            raise entries[key].error(f"{key} is {word!r}; expected one of {', '.join([*MODELS, *SYNONYMS])}")
+            return entries[key].choice({name: name for name in MODELS} | SYNONYMS)
     return "fisheye" if "fisheye_model" in entries and entries["fisheye_model"].number() else None
 
 
@@ -123,11 +116,8 @@ def _camera(node: Node, name: str, sensor: Array, coefficients: Array) -> Camera
 
 
 def _size(entries: dict[str, Node]) -> tuple[int, int] | None:
-    found = [next((entries[n] for n in names if n in entries), None) for names in (WIDTH, HEIGHT)]
-    width, height = found
-    if width is None or height is None:
-        return None
-    return width.integer(), height.integer()
+    width, height = ([entries[n] for n in names if n in entries] for names in (WIDTH, HEIGHT))
+    return (width[0].integer(), height[0].integer()) if width and height else None
 
 
 def write_opencv(path: Path | str, file: CameraFile) -> None:

@@ -13,7 +13,7 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.colmap.models import HALF, PARAMETERS, common_model, params_from_colmap
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, UNIT_TOLERANCE, load, require_once
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import FormatError, number
+from vslam_ref.datasets.text import FormatError, decoded, number
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations, Scene
 from vslam_ref.geometry import quaternion, se3
 from vslam_ref.geometry.cameras import Camera
@@ -76,7 +76,8 @@ def read_colmap(folder: Path | str, *, max_bytes: int | None = None) -> BundleFi
     model = _model(folder / FILES[0], lenses)
     params = np.array([_params(folder / FILES[0], model, camera) for camera in lenses.values()])
     seen, unmatched = _observations(folder / FILES[1], images, points)
-    scene = Scene(_poses(folder / FILES[1], images), _positions(points), params)
+    values = np.array([point.values for point in points.values()]).reshape(-1, len(POINT))
+    scene = Scene(_poses(folder / FILES[1], images), values[:, :3], params)
     place = {key: k for k, key in enumerate(lenses)}
     problem = BundleProblem(model, scene, seen, [place[image.camera] for image in images.values()])  # type: ignore[arg-type]
     return BundleFile(
@@ -85,7 +86,7 @@ def read_colmap(folder: Path | str, *, max_bytes: int | None = None) -> BundleFi
         view_names=tuple(image.name for image in images.values()),
         view_ids=np.array(list(images), dtype=np.int64),
         point_ids=np.array(list(points), dtype=np.int64),
-        colours=np.array([p.values[3:6] for p in points.values()]).reshape(-1, 3).astype(np.uint8),
+        colours=values[:, 3:6].astype(np.uint8),
         image_sizes=np.array([camera.size for camera in lenses.values()]),
         camera_models=tuple(camera.model for camera in lenses.values()),
         notes=_notes(unmatched, len(cameras) - len(lenses)),
@@ -94,17 +95,28 @@ def read_colmap(folder: Path | str, *, max_bytes: int | None = None) -> BundleFi
 
 def _lines(path: Path, max_bytes: int | None) -> Iterator[tuple[int, str]]:
     """Line number and stripped text of every line, empty ones and comments too."""
-    data = load(path, max_bytes)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise FormatError(path, line, "not a text file; UTF-8 expected") from None
+    text = decoded(path, load(path, max_bytes))
     return ((k, line.strip()) for k, line in enumerate(text.split("\n"), 1))
 
 
-def _told(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    return ((k, text) for k, text in lines if text and not text.startswith("#"))
+def _records(
+    path: Path, lines: Iterator[tuple[int, str]], right: str, fits: Callable[[int], bool], most: int = -1
+) -> Iterator[tuple[int, int, list[str]]]:
+    """Line, number and words (at most ``most`` + 1) of the records ``right``; the first word is the number."""
+    found: dict[int, int] = {}
+    for line, text in lines:
+        if not text or text.startswith("#"):
+            continue
+        words = text.split(maxsplit=most)
+        if not fits(len(words)):
+            raise FormatError(path, line, f"{len(words)} words; expected {right}")
+        name = right.split()[0]
+        key = _whole(path, line, words[0], name)
+        if key in found:
+            what = f"{name} {key} again; line {found[key]} has it already, expected another"
+            raise FormatError(path, line, what)
+        found[key] = line
+        yield line, key, words
 
 
 def _whole(path: Path, line: int, word: str, name: str, *, least: int = 0) -> int:
@@ -114,7 +126,7 @@ def _whole(path: Path, line: int, word: str, name: str, *, least: int = 0) -> in
 
 
 def _numbers(path: Path, line: int, words: Sequence[str], name: Callable[[int], str]) -> list[float]:
-    """Finite numbers below ``FARTHEST``; ``name`` tells of a word by its place."""
+    """Finite numbers below ``FARTHEST``; ``name`` is a word's by its place."""
     values = [number(path, line, word, name(k)) for k, word in enumerate(words)]
     for k, value in enumerate(values):
         if not abs(value) < FARTHEST:
@@ -122,24 +134,10 @@ def _numbers(path: Path, line: int, words: Sequence[str], name: Callable[[int], 
     return values
 
 
-def _require_new(path: Path, line: int, key: int, name: str, lines: dict[int, int]) -> None:
-    if key in lines:
-        raise FormatError(
-            path, line, f"{name} {key} again; line {lines[key]} has it already, expected another"
-        )
-    lines[key] = line
-
-
 def _cameras(path: Path, max_bytes: int | None) -> dict[int, _Camera]:
     found: dict[int, _Camera] = {}
-    lines: dict[int, int] = {}
-    for line, text in _told(_lines(path, max_bytes)):
-        words = text.split()
-        if len(words) < 4:
-            right = "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS"
-            raise FormatError(path, line, f"{len(words)} words; {right}")
-        key = _whole(path, line, words[0], "CAMERA_ID")
-        _require_new(path, line, key, "CAMERA_ID", lines)
+    right = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS"
+    for line, key, words in _records(path, _lines(path, max_bytes), right, lambda n: n >= 4):
         model, names = words[1], PARAMETERS.get(words[1])
         if names is None:
             raise FormatError(path, line, f"MODEL is {model[:40]!r}; expected one of {', '.join(PARAMETERS)}")
@@ -154,15 +152,8 @@ def _cameras(path: Path, max_bytes: int | None) -> dict[int, _Camera]:
 
 def _images(path: Path, max_bytes: int | None, cameras: dict[int, _Camera]) -> dict[int, _Image]:
     found: dict[int, _Image] = {}
-    at: dict[int, int] = {}
-    lines = _lines(path, max_bytes)
-    for line, text in _told(lines):
-        words = text.split(maxsplit=9)
-        if len(words) != 10:
-            right = f"expected IMAGE_ID {' '.join(POSE)} CAMERA_ID NAME"
-            raise FormatError(path, line, f"{len(words)} words; {right}")
-        key = _whole(path, line, words[0], "IMAGE_ID")
-        _require_new(path, line, key, "IMAGE_ID", at)
+    lines, right = _lines(path, max_bytes), f"IMAGE_ID {' '.join(POSE)} CAMERA_ID NAME"
+    for line, key, words in _records(path, lines, right, lambda n: n == 10, most=9):
         pose = _numbers(path, line, words[1:8], POSE.__getitem__)
         camera = _whole(path, line, words[8], "CAMERA_ID")
         if camera not in cameras:
@@ -193,14 +184,8 @@ def _features(path: Path, line: int, text: str) -> tuple[Array, IntArray]:
 
 def _points(path: Path, max_bytes: int | None) -> dict[int, _Point]:
     found: dict[int, _Point] = {}
-    lines: dict[int, int] = {}
-    for line, text in _told(_lines(path, max_bytes)):
-        words = text.split()
-        if len(words) < 8 or len(words) % 2:
-            right = f"expected POINT3D_ID {' '.join(POINT)} and pairs IMAGE_ID POINT2D_IDX"
-            raise FormatError(path, line, f"{len(words)} words; {right}")
-        key = _whole(path, line, words[0], "POINT3D_ID")
-        _require_new(path, line, key, "POINT3D_ID", lines)
+    right = f"POINT3D_ID {' '.join(POINT)} and pairs IMAGE_ID POINT2D_IDX"
+    for line, key, words in _records(path, _lines(path, max_bytes), right, lambda n: n >= 8 and n % 2 == 0):
         values = _numbers(path, line, words[1:8], POINT.__getitem__)
         for name, value in zip("RGB", values[3:6], strict=True):
             if not (0 <= value <= 255 and value == int(value)):
@@ -211,15 +196,15 @@ def _points(path: Path, max_bytes: int | None) -> dict[int, _Point]:
 
 
 def _require_tracks(path: Path, images: dict[int, _Image], points: dict[int, _Point]) -> None:
-    """Every track must name features that name this point: the two files tell the same twice."""
+    """Every track must name features that name this point: the two files say the same twice."""
     for key, point in points.items():
         for image, feature in point.track.tolist():
             if image not in images:
                 raise FormatError(path, point.line, f"TRACK names image {image}; expected one of images.txt")
             named = images[image].point
             if feature >= len(named) or named[feature] != key:
-                told = named[feature] if feature < len(named) else "none"
-                what = f"TRACK names feature {feature} of image {image}, which has point {told}"
+                point_there = named[feature] if feature < len(named) else "none"
+                what = f"TRACK names feature {feature} of image {image}, which has point {point_there}"
                 raise FormatError(path, point.line, f"{what}; expected {key}")
     counts = {key: len(point.track) for key, point in points.items()}
     for image in images.values():
@@ -228,10 +213,9 @@ def _require_tracks(path: Path, images: dict[int, _Image], points: dict[int, _Po
                 counts[key] -= 1
     for key, left in counts.items():
         if left:
-            what = f"TRACK of point {key} has {len(points[key].track)} features, images.txt"
-            raise FormatError(
-                path, points[key].line, f"{what} {len(points[key].track) - left}; expected the same"
-            )
+            has = len(points[key].track)
+            what = f"TRACK of point {key} has {has} features, images.txt {has - left}; expected the same"
+            raise FormatError(path, points[key].line, what)
 
 
 def _model(path: Path, lenses: dict[int, _Camera]) -> type[Camera]:
@@ -267,10 +251,6 @@ def _poses(path: Path, images: dict[int, _Image]) -> Array:
     return se3.from_rt(R, values[:, 4:])
 
 
-def _positions(points: dict[int, _Point]) -> Array:
-    return np.array([point.values[:3] for point in points.values()]).reshape(-1, 3)
-
-
 def _observations(
     path: Path, images: dict[int, _Image], points: dict[int, _Point]
 ) -> tuple[Observations, int]:
@@ -302,9 +282,5 @@ def _observations(
 
 
 def _notes(unmatched: int, unused: int) -> tuple[str, ...]:
-    told = []
-    if unmatched:
-        told.append(f"{unmatched} features without a point were left out")
-    if unused:
-        told.append(f"{unused} cameras without an image were left out")
-    return tuple(told)
+    left_out = {"features without a point": unmatched, "cameras without an image": unused}
+    return tuple(f"{count} {what} were left out" for what, count in left_out.items() if count)
