@@ -6,11 +6,11 @@ A set is a folder of its name inside one of the folders that ``VSLAM_REF_DATA`` 
 
 from __future__ import annotations
 
-import difflib
 import os
 from pathlib import Path
 
 from vslam_ref.datasets.known import DATA_SETS, DataSet
+from vslam_ref.support.errors import suggestion
 
 VARIABLE = "VSLAM_REF_DATA"
 
@@ -25,9 +25,7 @@ def get(name: str) -> DataSet:
     """
     by_name = {data_set.name: data_set for data_set in DATA_SETS}
     if name not in by_name:
-        near = difflib.get_close_matches(name, by_name, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise ValueError(f"unknown data set {name!r}{hint}; known: {', '.join(by_name)}")
+        raise ValueError(f"unknown data set {name!r}{suggestion(name, by_name)}; known: {', '.join(by_name)}")
     return by_name[name]
 
 
@@ -45,11 +43,8 @@ def find(name: str) -> Path | None:
         If no data set has that name.
     """
     data_set = get(name)
-    for root in search_path():
-        folder = root / name
-        if all((folder / file).exists() for file in data_set.files):
-            return folder
-    return None
+    folders = (root / name for root in search_path())
+    return next((f for f in folders if all((f / file).exists() for file in data_set.files)), None)
 
 
 def require(name: str) -> Path:

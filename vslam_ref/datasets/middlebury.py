@@ -6,7 +6,7 @@ The file ``*_par.txt`` says in its first line how many pictures there are, and i
 
 The projection is K [R t], so R and t are ``T_cam_world``; x is to the right, y down.  The note that comes
 with the data does not say where in a pixel its position is.  Numbers are returned as filed; the temple's
-pictures fit them better with (0.27, -0.82) px added to all pixels, as views that hang upside down tell
+pictures fit them better with (0.27, -0.82) px added to all pixels, as views that hang upside down show
 (:func:`vslam_ref.experiments.multiview.study.principal_offset`).
 """
 
@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import FormatError, number, read_lines
+from vslam_ref.datasets.text import FormatError, numbers, read_lines
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
 
@@ -61,8 +61,8 @@ def read_cameras(path: Path) -> Cameras:
         raise FormatError(path, None, "empty; expected the number of pictures, then a line for each")
     first, text = lines[0]
     if not text.isdecimal() or int(text) != len(lines) - 1:
-        told = f"says {text!r} pictures, {len(lines) - 1} lines follow; the first line must be their number"
-        raise FormatError(path, first, told)
+        what = f"says {text!r} pictures, {len(lines) - 1} lines follow; the first line must be their number"
+        raise FormatError(path, first, what)
     views = [_view(path, line, text) for line, text in lines[1:]]
     names = [name for name, _, _ in views]
     for k, name in enumerate(names):
@@ -81,17 +81,17 @@ def _view(path: Path, line: int, text: str) -> tuple[str, Pinhole, Array]:
         raise FormatError(path, line, f"{len(words)} columns; expected 22: name, K (9), R (9), t (3)")
     if Path(words[0]).name != words[0] or words[0] in (".", ".."):
         raise FormatError(path, line, f"name is {words[0]!r}; expected a file name without a folder")
-    values = [number(path, line, word, name) for word, name in zip(words[1:], COLUMNS[1:], strict=True)]
+    values = numbers(path, line, words[1:], COLUMNS[1:])
     K, R, t = np.array(values[:9]).reshape(3, 3), np.array(values[9:18]).reshape(3, 3), np.array(values[18:])
     if K[0, 1] != 0 or (K[1:, 0] != 0).any() or K[2, 1] != 0 or K[2, 2] != 1:
-        told = "K is not [fx 0 cx; 0 fy cy; 0 0 1]; cameras with a skew are not supported"
-        raise FormatError(path, line, told)
+        what = "K is not [fx 0 cx; 0 fy cy; 0 0 1]; cameras with a skew are not supported"
+        raise FormatError(path, line, what)
     if not (K[0, 0] > 0 and K[1, 1] > 0):
         raise FormatError(path, line, f"focal lengths {K[0, 0]:g}, {K[1, 1]:g}; must be more than 0")
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(R @ R.T - np.eye(3)).max()
         if not (off <= ORTHONORMAL and np.linalg.det(R) > 0):
-            told = f"R is no rotation: R R^T is off by {off:.3g}, determinant {np.linalg.det(R):.3g}"
-            raise FormatError(path, line, f"{told}; expected 0 and 1")
+            what = f"R is no rotation: R R^T is off by {off:.3g}, determinant {np.linalg.det(R):.3g}"
+            raise FormatError(path, line, f"{what}; expected 0 and 1")
     camera = Pinhole(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
-    return words[0], camera, se3.from_rt(se3.rotation(se3.nearest(se3.from_rt(R, t))), t)
+    return words[0], camera, se3.nearest(se3.from_rt(R, t))

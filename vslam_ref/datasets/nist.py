@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import FormatError, number, read_lines
+from vslam_ref.datasets.text import FormatError, number, numbers, read_lines
 
 MAX_BYTES = 2**20
 """The largest of the 27 files of the collection has 0.2 MiB."""
@@ -80,8 +80,8 @@ def read_problem(path: Path) -> NistProblem:
     lines = dict(read_lines(path, MAX_BYTES))
     for at, text in lines.items():
         if len(text) > LONGEST_LINE:
-            told = f"a line of {len(text)} characters; expected at most {LONGEST_LINE}"
-            raise FormatError(path, at, told)
+            what = f"a line of {len(text)} characters; expected at most {LONGEST_LINE}"
+            raise FormatError(path, at, what)
     _, title = _find(path, lines, r"Dataset Name:\s*(\S+)")
     begin, end = _places(path, lines, "Starting Values")
     values = np.array([_values(path, lines, i, i - begin + 1) for i in range(begin, end + 1)])
@@ -91,8 +91,8 @@ def read_problem(path: Path) -> NistProblem:
         raise FormatError(path, None, f"{len(data)} lines of data; {observations:g} observations stated")
     degrees = _certified(path, lines, "Degrees of Freedom")
     if len(data) - len(values) != degrees:
-        told = f"{len(data)} observations, {len(values)} parameters; {degrees:g} degrees of freedom stated"
-        raise FormatError(path, None, told)
+        what = f"{len(data)} observations, {len(values)} parameters; {degrees:g} degrees of freedom stated"
+        raise FormatError(path, None, what)
     return NistProblem(
         name=title,
         level=_find(path, lines, r"(\w+) Level of Difficulty")[1],
@@ -130,10 +130,10 @@ def _values(path: Path, lines: Lines, at: int, index: int) -> list[float]:
     label, _, rest = lines.get(at, "").partition("=")
     words = rest.split()
     if label.strip() != f"b{index}" or len(words) != 4:
-        told = f"{lines.get(at, '')!r}; expected 'b{index} = start start certified deviation'"
-        raise FormatError(path, at, told)
+        what = f"{lines.get(at, '')!r}; expected 'b{index} = start start certified deviation'"
+        raise FormatError(path, at, what)
     kinds = ("start 1", "start 2", "certified value", "standard deviation")
-    read = [number(path, at, word, f"{kind} of b{index}") for word, kind in zip(words, kinds, strict=True)]
+    read = numbers(path, at, words, [f"{kind} of b{index}" for kind in kinds])
     if not (read[2] != 0.0 and read[3] > 0.0):
         raise FormatError(path, at, "expected a certified value that is not 0 and a deviation > 0")
     return read
@@ -147,10 +147,7 @@ def _data(path: Path, lines: Lines) -> Array:
         raise FormatError(path, begin - 1, "expected 'Data: y x' or 'Data: y x1 x2' above the data")
     rows = []
     for at in range(begin, end + 1):
-        words = lines.get(at, "").split()
-        if len(words) != len(head) - 1:
-            raise FormatError(path, at, f"{len(words)} numbers; expected {len(head) - 1}")
-        rows.append([number(path, at, word, name) for word, name in zip(words, head[1:], strict=True)])
+        rows.append(numbers(path, at, lines.get(at, "").split(), head[1:]))
     beyond = [at for at in lines if at > end]
     if beyond:
         raise FormatError(path, beyond[0], f"text after the data, which end in line {end}")

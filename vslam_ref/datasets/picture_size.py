@@ -71,8 +71,8 @@ def _require_chunks(path: Path, stream: IO[bytes]) -> None:
         length, name = int.from_bytes(head[:4], "big"), head[4:]
         at += 12 + length
         if len(head) < 8 or at > end:
-            told = name.decode("ascii", "backslashreplace")
-            what = f"chunk {told!r} of {length} bytes goes {at - end} beyond the file"
+            shown = name.decode("ascii", "backslashreplace")
+            what = f"chunk {shown!r} of {length} bytes goes {at - end} beyond the file"
             raise FormatError(path, None, f"{what}: the picture is cut off or damaged; fetch it again")
         if name == b"IEND":
             return

@@ -172,6 +172,13 @@ def number(path: Path, line: int, word: str, name: str) -> float:
     return value
 
 
+def numbers(path: Path, line: int, words: Sequence[str], names: Sequence[str]) -> list[float]:
+    """Read the numbers of a line, which must be as many as they have names."""
+    if len(words) != len(names):
+        raise FormatError(path, line, f"{len(words)} columns; expected {len(names)}: {', '.join(names)}")
+    return [number(path, line, word, name) for word, name in zip(words, names, strict=True)]
+
+
 def is_number(word: str) -> bool:
     """Whether Python reads a word as a number, finite or not."""
     try:
@@ -199,11 +206,7 @@ def read_columns(path: Path, names: Sequence[str]) -> Columns:
     rows: list[list[float]] = []
     lines: list[int] = []
     for line, text in read_lines(path):
-        words = text.split()
-        if len(words) != len(names):
-            right = f"expected {len(names)}: {', '.join(names)}"
-            raise FormatError(path, line, f"{len(words)} columns; {right}")
-        rows.append([number(path, line, word, name) for word, name in zip(words, names, strict=True)])
+        rows.append(numbers(path, line, text.split(), names))
         lines.append(line)
     if not rows:
         raise FormatError(path, None, f"no data; expected lines of {', '.join(names)}")

@@ -93,9 +93,8 @@ def read_log(folder: Path) -> SlamLog:
     times, steering = raw["time"] / 1e3, raw["steering"]
     back = np.flatnonzero(np.diff(times) < 0)
     if len(back):
-        raise FormatError(
-            path, None, f"time({back[0] + 2}) lies before the one above; times must not go back"
-        )
+        what = f"time({back[0] + 2}) lies before the one above; times must not go back"
+        raise FormatError(path, None, what)
     steep = np.flatnonzero(np.abs(steering) >= np.pi / 3)
     if len(steep):
         what = f"steering({steep[0] + 1}) is {steering[steep[0]]:g}; expected radians within +-1.05"
@@ -140,9 +139,8 @@ def read_graph(path: Path) -> GraphFile:
         elif word == "LANDMARK":
             i, identity, x, y = _values(path, line, rest, ("pose", "landmark", "dx", "dy"), 3)
             if i not in index:
-                raise FormatError(
-                    path, line, f"LANDMARK seen from pose {i:g}, which no line above has reached"
-                )
+                what = f"LANDMARK seen from pose {i:g}, which no line above has reached"
+                raise FormatError(path, line, what)
             if x <= 0 and y == 0:
                 raise FormatError(path, line, "LANDMARK at the sensor or straight behind; expected one ahead")
             rows.append((index[int(i)], int(identity), x, y))

@@ -44,6 +44,7 @@ from vslam_ref.geometry.cameras import Radtan
 ORDERS = {b"v": "<", b"V": ">"}
 SPACES = {b"P": "pixels", b"N": "normalised"}
 INTRINSICS = ("f", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
+UNIT = [1.0] + 7 * [0.0]
 PARTS: dict[str, tuple[tuple[str, str, tuple[int, ...]], ...]] = {
     "camera": (("id", "i4", ()), ("R", "f4", (3, 3)), ("t", "f4", (3,))),
     "point": (("id", "i4", ()), ("X", "f4", (3,))),
@@ -100,15 +101,12 @@ def _intrinsics(path: Path, data: bytes, order: str, space: str) -> tuple[Array,
     stored = np.frombuffer(data, f"{order}f4", len(INTRINSICS), 2)
     _require_numbers(path, stored, "intrinsics")
     given = stored.astype(np.float64)
-    if space == "normalised":
-        f = [1.0] + 7 * [0.0]
-        told = (
+    notes = []
+    if space == "normalised" and given.tolist() != UNIT:
+        notes = [
             "markers are normalised: f = 1 and all other intrinsics 0, whatever the file says of its images"
-        )
-        notes = [] if given.tolist() == f else [told]
-        given = np.array(f)
-    else:
-        notes = []
+        ]
+        given = np.array(UNIT)
     if not given[0] > 0:
         raise FormatError(path, None, f"focal length is {given[0]:g}; expected more than 0 pixels")
     named = dict(zip(INTRINSICS, given.tolist(), strict=True))
@@ -138,9 +136,9 @@ def _require_numbers(path: Path, values: NDArray[Any], name: str) -> None:
     with np.errstate(invalid="ignore"):  # a signalling NaN
         bad = np.argwhere(~(np.abs(values) < FARTHEST))
     if len(bad):
-        told = f"{name} {bad[0][0]}" if values.ndim > 1 else name
+        place = f"{name} {bad[0][0]}" if values.ndim > 1 else name
         shown = values[tuple(bad[0])].item()
-        raise FormatError(path, None, f"{told} has the number {shown:g}; expected finite ones below 1e15")
+        raise FormatError(path, None, f"{place} has the number {shown:g}; expected finite ones below 1e15")
 
 
 def _require_distinct(path: Path, ids: NDArray[Any], name: str) -> None:
@@ -155,9 +153,8 @@ def _observations(
     path: Path, images: NDArray[Any], tracks: NDArray[Any], markers: NDArray[Any]
 ) -> tuple[Observations, int]:
     """Markers with views and points counted from 0, and how many belong to none."""
-    view, view_known = _index(images, markers["view"])
-    point, point_known = _index(tracks, markers["point"])
-    keep = np.flatnonzero(view_known & point_known)
+    view, point = _places(images, markers["view"]), _places(tracks, markers["point"])
+    keep = np.flatnonzero((view >= 0) & (point >= 0))
     view, point = view[keep], point[keep]
     require_once(
         path,
@@ -169,10 +166,7 @@ def _observations(
     return Observations(view, point, markers["uv"][keep]), len(markers) - len(keep)
 
 
-def _index(ids: NDArray[Any], wanted: NDArray[Any]) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Places of numbers among ``ids``, and whether they are there."""
-    if not len(ids):
-        return np.zeros(len(wanted), np.int64), np.zeros(len(wanted), np.bool_)
-    order = np.argsort(ids, kind="stable")
-    place = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
-    return place.astype(np.int64), np.asarray(ids[place] == wanted)
+def _places(ids: NDArray[Any], wanted: NDArray[Any]) -> IntArray:
+    """Places of numbers among ``ids``, -1 for one that is not there."""
+    place = {number: k for k, number in enumerate(ids.tolist())}
+    return np.array([place.get(number, -1) for number in wanted.tolist()], dtype=np.int64)

@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 
 from vslam_ref.datasets.calibration_files.record import CameraFile, relative_sensor
-from vslam_ref.datasets.text import FormatError, number, read_lines
+from vslam_ref.datasets.text import FormatError, numbers, read_lines
 from vslam_ref.geometry.cameras import Fov
 
 VARIABLE = "Camera.Parameters"
@@ -34,13 +34,11 @@ def read_ptam(path: Path | str, size: tuple[int, int]) -> CameraFile:
     FormatError
         Where the variable is missing, stands twice, or is not five numbers that make a camera.
     ValueError
-        On a size that is none.
+        On a size below one pixel.
     """
     path = Path(path)
     if min(size) < 1:
         raise ValueError(f"size={size}: need (width, height), both at least 1")
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
     found: tuple[int, str] | None = None
     for line, text in read_lines(path):
         match = re.match(rf"{re.escape(VARIABLE)}\s*=\s*(.*)$", text.split("//")[0].strip())
@@ -56,12 +54,9 @@ def read_ptam(path: Path | str, size: tuple[int, int]) -> CameraFile:
     words = value[1:-1].split()
     if len(words) != 5:
         raise FormatError(path, line, f"{VARIABLE} has {len(words)} numbers; {RIGHT}")
-    fx, fy, cx, cy, omega = (
-        number(path, line, word, name)
-        for word, name in zip(words, ("fx", "fy", "cx", "cy", "omega"), strict=True)
-    )
+    *sensor, omega = numbers(path, line, words, ("fx", "fy", "cx", "cy", "omega"))
     try:
-        camera = Fov(**relative_sensor((fx, fy, cx, cy), size), omega=abs(omega))
+        camera = Fov(*relative_sensor(sensor, size), abs(omega))
     except ValueError as error:
         raise FormatError(path, line, str(error)) from None
     return CameraFile(camera, size)

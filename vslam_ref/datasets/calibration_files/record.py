@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vslam_ref.arrays import Array
@@ -56,13 +57,8 @@ def pixels_from_relative(relative: float, size: int, *, centre: bool) -> float:
     return relative * size - (0.5 if centre else 0.0)
 
 
-def relative_sensor(relative: tuple[float, ...], size: tuple[int, int]) -> dict[str, float]:
+def relative_sensor(relative: Sequence[float], size: tuple[int, int]) -> list[float]:
     """``fx, fy, cx, cy`` in pixels from four relative numbers."""
-    fx, fy, cx, cy = relative
-    width, height = size
-    return {
-        "fx": pixels_from_relative(fx, width, centre=False),
-        "fy": pixels_from_relative(fy, height, centre=False),
-        "cx": pixels_from_relative(cx, width, centre=True),
-        "cy": pixels_from_relative(cy, height, centre=True),
-    }
+    sides, centres = (*size, *size), (False, False, True, True)
+    rows = zip(relative, sides, centres, strict=True)
+    return [pixels_from_relative(value, side, centre=centre) for value, side, centre in rows]

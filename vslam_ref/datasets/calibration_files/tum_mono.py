@@ -70,9 +70,9 @@ def _camera(path: Path, line: int, text: str, size: tuple[int, int]) -> Camera:
     if len(words) not in ((5,) if kind == "fov" else (4, 5)):
         raise FormatError(path, line, f"{len(words)} numbers; expected 5: {' '.join(NAMES)}")
     values = [number(path, line, word, name) for word, name in zip(words, NAMES, strict=False)]
-    sensor = tuple(values[:4])
+    sensor = values[:4]
     if values[2] < 1 and values[3] < 1:
-        sensor = tuple(relative_sensor(sensor, size).values())
+        sensor = relative_sensor(sensor, size)
     try:
         if kind == "fov":
             return Fov.from_params([*sensor, values[4]])

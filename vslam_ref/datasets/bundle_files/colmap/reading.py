@@ -102,7 +102,7 @@ def _lines(path: Path, max_bytes: int | None) -> Iterator[tuple[int, str]]:
 def _records(
     path: Path, lines: Iterator[tuple[int, str]], right: str, fits: Callable[[int], bool], most: int = -1
 ) -> Iterator[tuple[int, int, list[str]]]:
-    """Line, number and words (at most ``most`` + 1) of the records ``right``; the first word is the number."""
+    """Line, number and words of the records ``right``, whose first word is their number."""
     found: dict[int, int] = {}
     for line, text in lines:
         if not text or text.startswith("#"):

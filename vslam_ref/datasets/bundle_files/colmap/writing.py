@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +13,7 @@ from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry import quaternion
 from vslam_ref.geometry.cameras import projection
+from vslam_ref.support.files import new_folder
 
 GREY = (128, 128, 128)
 
@@ -45,18 +43,10 @@ def write_colmap(folder: Path | str, file: BundleFile) -> None:
     folder = Path(folder)
     _require_free(folder)
     content = dict(zip(FILES, (_cameras(file), _images(file), _points(file)), strict=True))
-    beside = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}")
-    beside.mkdir(parents=True)
-    try:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder(folder) as beside:
         for name, text in content.items():
             (beside / name).write_text(text, encoding="utf-8")
-        if folder.is_dir():
-            for name in FILES:
-                os.replace(beside / name, folder / name)
-        else:
-            os.replace(beside, folder)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 def _require_free(folder: Path) -> None:
@@ -72,9 +62,9 @@ def _cameras(file: BundleFile) -> str:
     if file.problem.seen.cov_uv is not None:
         raise ValueError("observations with covariances: COLMAP has no place for them")
     lines = ["# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]"]
-    told = file.camera_models or ("",) * len(file.problem.scene.intrinsics)
+    models = file.camera_models or ("",) * len(file.problem.scene.intrinsics)
     for k, params in enumerate(file.problem.scene.intrinsics):
-        name, values = params_to_colmap(file.problem.model, params, told[k])
+        name, values = params_to_colmap(file.problem.model, params, models[k])
         width, height = _size(file, k)
         lines.append(f"{k + 1} {name} {width} {height} {' '.join(map(repr, values))}")
     return "\n".join(lines) + "\n"
