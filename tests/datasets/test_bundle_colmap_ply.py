@@ -19,8 +19,7 @@ from vslam_ref.datasets.bundle_files import (
     write_ply,
 )
 from vslam_ref.datasets.bundle_files.colmap.models import (
-    PARAMETERS,
-    SMALLEST,
+    MODELS,
     common_model,
     params_from_colmap,
     params_to_colmap,
@@ -115,10 +114,10 @@ def test_every_colmap_model_projects_as_colmap_does() -> None:
     values = {"omega": 0.9, "f": 500.0, "fx": 500.0, "fy": 510.0, "cx": 320.0, "cy": 240.0}
     small = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6"), (-0.1, 0.02, 0.01, 0.1, 0.03, 0.004), strict=True))
     values |= small | {"p1": 1e-3, "p2": -2e-3}
-    for name, parameters in PARAMETERS.items():
+    for name, (model, parameters) in MODELS.items():
         params = [values[parameter] for parameter in parameters]
         theirs = pycolmap.Camera(model=name, width=640, height=480, params=params).img_from_cam(X)
-        ours = SMALLEST[name].from_params(params_from_colmap(name, params, SMALLEST[name])).project(X)
+        ours = model.from_params(params_from_colmap(name, params, model)).project(X)
         np.testing.assert_allclose(ours.uv + 0.5, theirs, rtol=0, atol=1e3 * 20 * EPS, err_msg=name)
 
 

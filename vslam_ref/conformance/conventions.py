@@ -37,6 +37,16 @@ from vslam_ref.conformance.catalogue import Function
 from vslam_ref.conformance.compare import numbers
 from vslam_ref.geometry import se3
 
+CHANGED_BY = {
+    "pose": "transform",
+    "poses": "transform",
+    "quaternion": "quaternion_order",
+    "pixel": "pixel_origin",
+    "intrinsics": "pixel_origin",
+    "residual": "residual",
+}
+"""Kind of quantity -> the choice that changes it; tangents are changed by their order."""
+ON_POSES = ("pose_jacobian", "pose_covariance", "pose_information")
 ROTATION_FIRST = [3, 4, 5, 0, 1, 2]
 ROTATION_FIRST_SIM3 = [3, 4, 5, 0, 1, 2, 6]
 
@@ -67,93 +77,49 @@ class Convention:
 
     def inputs(self, function: Function, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Inputs in the program's form."""
-        return {name: self._out(kind, inputs[name], inputs) for name, kind in function.inputs.items()}
+        return {name: self._converted(kind, inputs[name], inputs) for name, kind in function.inputs.items()}
 
     def outputs(
         self, function: Function, outputs: Mapping[str, Any], inputs: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Outputs of a program in the house's form; ``inputs`` are the house's."""
         known = {name: kind for name, kind in function.outputs.items() if name in outputs}
-        return {name: self._home(kind, outputs[name], inputs) for name, kind in known.items()}
+        return {name: self._converted(kind, outputs[name], inputs, home=True) for name, kind in known.items()}
 
-    def _out(self, kind: str, value: Any, inputs: Mapping[str, Any]) -> Any:
-        """One quantity, from the house's form to the program's.
+    def _converted(self, kind: str, value: Any, inputs: Mapping[str, Any], *, home: bool = False) -> Any:
+        """One quantity, from the house's form to the program's, or back ``home``."""
+        about = "tangent_order" if kind.startswith("tangent") else CHANGED_BY.get(kind)
+        on_pose = kind in ON_POSES
+        if not on_pose and (about is None or getattr(self, about) == getattr(Convention, about)):
+            return value
+        x, order = numbers(value), np.array(self._order(kind))
+        order, half = (np.argsort(order), -0.5) if home else (order, 0.5)
+        if on_pose:
+            return self._on_pose(kind, x, inputs, home).tolist()
+        if about == "transform":
+            return se3.inverse(x).tolist()
+        if about == "quaternion_order":
+            return x[..., [3, 0, 1, 2] if home else [1, 2, 3, 0]].tolist()
+        if about == "pixel_origin":
+            return (x + half * (_centre(x) if kind == "intrinsics" else 1.0)).tolist()
+        if about == "residual":
+            return (-x).tolist()
+        turned = x[..., order, :] if kind.startswith("tangent_matrix") else x
+        return turned[..., order].tolist()
+
+    def _on_pose(self, kind: str, x: Array, inputs: Mapping[str, Any], home: bool) -> Array:
+        """Jacobian, covariance or information of a pose's tangent vector.
 
         Implements :eq:`eq-convention-jacobian` and :eq:`eq-convention-covariance`.
         """
-        if self._unchanged(kind):
-            return value
-        x = numbers(value)
-        if kind in ("pose", "poses"):
-            return se3.inverse(x).tolist()
-        if kind == "quaternion":
-            return x[..., [1, 2, 3, 0]].tolist()
-        if kind in ("tangent", "tangent_sim3"):
-            return x[..., self._order(kind)].tolist()
-        if kind.startswith("tangent_matrix"):
-            return x[..., self._order(kind), :][..., self._order(kind)].tolist()
-        if kind == "pixel":
-            return (x + 0.5).tolist()
-        if kind == "intrinsics":
-            return (x + 0.5 * _centre(x)).tolist()
-        if kind == "residual":
-            return (-x).tolist()
-        M = self._from_program(inputs)
+        M = self._from_program(inputs)[:, self._order(kind)]  # xi = M eta, eta in the program's order
+        M = np.asarray(np.linalg.inv(M)) if home else M
         if kind == "pose_jacobian":
-            return (x @ M)[..., self._order(kind)].tolist()
-        order = self._order(kind)
+            return np.asarray(x @ M)
         if kind == "pose_information":
-            return (np.swapaxes(M, -1, -2) @ x @ M)[..., order, :][..., order].tolist()
+            return np.asarray(np.swapaxes(M, -1, -2) @ x @ M)
         back = np.linalg.inv(M)
-        return (back @ x @ np.swapaxes(back, -1, -2))[..., order, :][..., order].tolist()
-
-    def _home(self, kind: str, value: Any, inputs: Mapping[str, Any]) -> Any:
-        """One quantity, from the program's form to the house's.
-
-        Implements :eq:`eq-convention-jacobian` and :eq:`eq-convention-covariance`.
-        """
-        if self._unchanged(kind):
-            return value
-        x = numbers(value)
-        if kind in ("pose", "poses"):
-            return se3.inverse(x).tolist()
-        if kind == "quaternion":
-            return x[..., [3, 0, 1, 2]].tolist()
-        back = np.argsort(self._order(kind))
-        if kind in ("tangent", "tangent_sim3"):
-            return x[..., back].tolist()
-        if kind.startswith("tangent_matrix"):
-            return x[..., back, :][..., back].tolist()
-        if kind == "pixel":
-            return (x - 0.5).tolist()
-        if kind == "intrinsics":
-            return (x - 0.5 * _centre(x)).tolist()
-        if kind == "residual":
-            return (-x).tolist()
-        M = self._from_program(inputs)
-        if kind == "pose_jacobian":
-            return (x[..., back] @ np.linalg.inv(M)).tolist()
-        if kind == "pose_information":
-            away = np.linalg.inv(M)
-            return (np.swapaxes(away, -1, -2) @ x[..., back, :][..., back] @ away).tolist()
-        return (M @ x[..., back, :][..., back] @ np.swapaxes(M, -1, -2)).tolist()
-
-    def _unchanged(self, kind: str) -> bool:
-        """Whether this convention leaves a kind as it is."""
-        plain = Convention()
-        same = {
-            "pose": self.transform == plain.transform,
-            "poses": self.transform == plain.transform,
-            "quaternion": self.quaternion_order == plain.quaternion_order,
-            "pixel": self.pixel_origin == plain.pixel_origin,
-            "intrinsics": self.pixel_origin == plain.pixel_origin,
-            "residual": self.residual == plain.residual,
-            "tangent": self.tangent_order == plain.tangent_order,
-            "pose_jacobian": False,
-            "pose_covariance": False,
-            "pose_information": False,
-        }
-        return same.get("tangent" if kind.startswith("tangent") else kind, True)
+        return np.asarray(back @ x @ np.swapaxes(back, -1, -2))
 
     def _order(self, kind: str) -> list[int]:
         """Where the program's coordinates stand in the house's."""

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
+from vslam_ref.datasets.text import is_number
 
 LARGEST = 2**30
 """Bytes of a file, and of what it unpacks to."""
@@ -103,23 +104,15 @@ def _rows(path: Path) -> Iterator[tuple[int, list[float]]]:
             try:
                 values = [float(word) for word in words]
             except ValueError:
-                if first and not _is_number(words[0]):
+                if first and not is_number(words[0]):
                     first = False  # the names of the columns
                     continue
-                bad = next(word for word in words if not _is_number(word))
+                bad = next(word for word in words if not is_number(word))
                 raise ValueError(f"{path}:{number}: {bad[:40]!r} is no number") from None
             if not all(map(math.isfinite, values)):
                 raise ValueError(f"{path}:{number}: a number is not finite")
             first = False
             yield number, values
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 # -- npz -------------------------------------------------------------------------------------------
@@ -137,9 +130,8 @@ def _npz(path: Path) -> tuple[Array, Array, Array, Array]:
     n = len(run) if run.ndim == 1 else -1
     d = error.shape[1] if error.ndim == 2 else -1
     if n < 1 or d < 1 or step.shape != (n,) or error.shape != (n, d) or covariance.shape != (n, d, d):
-        shapes = ", ".join(
-            f"{name} {a.shape}" for name, a in zip(ARRAYS, (run, step, error, covariance), strict=True)
-        )
+        arrays = zip(ARRAYS, (run, step, error, covariance), strict=True)
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays)
         raise ValueError(f"{path}: {shapes}; need (N,), (N,), (N, d) and (N, d, d)")
     return run, step, error, covariance
 

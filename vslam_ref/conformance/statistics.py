@@ -32,7 +32,7 @@ def mean_square(x: Array) -> float:
 
 
 def mean_fourth(x: Array) -> float:
-    """Mean fourth power of all entries: what tells a uniform from a Gaussian distribution."""
+    """Mean fourth power of all entries: it tells a uniform from a Gaussian distribution."""
     return float((x**4).mean())
 
 
@@ -71,8 +71,8 @@ def judge(case: Case, got: dict[str, Any]) -> Difference:
     except ValueError as error:
         return Difference(False, f"{name}: {error}", None, "samples", float("inf"), 0.0)
     if len(np.atleast_1d(samples)) != rule["samples"] or not np.isfinite(samples).all():
-        told = f"{name}: {len(np.atleast_1d(samples))} finite samples, expected {rule['samples']}"
-        return Difference(False, told, None, None, float("inf"), 0.0)
+        what = f"{name}: {len(np.atleast_1d(samples))} finite samples, expected {rule['samples']}"
+        return Difference(False, what, None, None, float("inf"), 0.0)
     try:
         value = MEASURES[str(rule["measure"])](samples)
     except (ValueError, IndexError) as error:
@@ -80,8 +80,8 @@ def judge(case: Case, got: dict[str, Any]) -> Difference:
     low, high = float(rule["low"]), float(rule["high"])
     if low <= value <= high:
         return RIGHT
-    told = f"{rule['measure']} of {name} (a right program fails with probability {rule['false_alarm']:g})"
-    return Difference(False, told, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
+    what = f"{rule['measure']} of {name} (a right program fails with probability {rule['false_alarm']:g})"
+    return Difference(False, what, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
 
 
 def mistaken(case: Case, got: dict[str, Any]) -> str:

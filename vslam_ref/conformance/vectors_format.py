@@ -129,24 +129,10 @@ def parse(name: str, content: dict[str, Any]) -> VectorFile:
     """Make cases of a file's content: what a group says holds for each of its cases."""
     cases = []
     for group in content["groups"]:
+        shared = {**group, "flags": tuple(group["flags"]), "topic": content["topic"]}
         for row in group["cases"]:
-            cases.append(
-                Case(
-                    id=row["id"],
-                    function=group["function"],
-                    equation=group["equation"],
-                    oracle=group["oracle"],
-                    flags=tuple(group["flags"]),
-                    inputs=row["inputs"],
-                    expected=row["expected"],
-                    accept=row.get("accept", []),
-                    mistakes=row.get("mistakes", {}),
-                    result=row.get("result", "valid"),
-                    tolerance=row.get("tolerance", group["tolerance"]),
-                    statistic=group.get("statistic"),
-                    topic=content["topic"],
-                )
-            )
+            fields = {"accept": [], "mistakes": {}, "result": "valid", "statistic": None} | shared | row
+            cases.append(Case(**{field: fields[field] for field in Case._fields}))
     return VectorFile(name, int(content["chapter"]), content["version"], content["notes"], cases)
 
 

@@ -73,8 +73,8 @@ class Numbers:
         """Numbers as integers from 0 to ``below`` - 1, or :class:`FormatError` at the first that is none."""
         places = np.asarray(at)
         values = self.values[places]
-        told = right or (f"a whole number from 0 to {below - 1}" if below > 0 else "none, there are none")
-        self.require((values >= 0) & (values < below) & (values == np.floor(values)), places, name, told)
+        right = right or (f"a whole number from 0 to {below - 1}" if below > 0 else "none, there are none")
+        self.require((values >= 0) & (values < below) & (values == np.floor(values)), places, name, right)
         found: IntArray = values.astype(np.int64)
         return found
 
@@ -84,13 +84,13 @@ class Numbers:
             at = int(np.argmax(~(np.abs(self.values) < limit)))
             raise self.error(at, f"a number is {self.values[at]:g}; expected less than {limit:g} in size")
 
-    def require_count(self, count: int, told: str) -> None:
-        """Raise :class:`FormatError` unless there are exactly ``count`` numbers; ``told`` says why."""
+    def require_count(self, count: int, why: str) -> None:
+        """Raise :class:`FormatError` unless there are exactly ``count`` numbers; ``why`` says of what."""
         if len(self.values) < count:
-            what = f"the file ends after {len(self.values)} numbers; expected {count}: {told}"
+            what = f"the file ends after {len(self.values)} numbers; expected {count}: {why}"
             raise self.error(len(self.values), what)
         if len(self.values) > count:
-            raise self.error(count, f"numbers go on; expected {count} in the file: {told}")
+            raise self.error(count, f"numbers go on; expected {count} in the file: {why}")
 
 
 def read_numbers(path: Path, data: bytes) -> Numbers:

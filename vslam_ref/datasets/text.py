@@ -84,21 +84,23 @@ def existing(folder: Path, name: str) -> Path:
     raise FormatError(folder / name, None, "no such file, plain or with .gz")
 
 
-def read_bytes(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
-    """Read a file, unpacked if its name ends in ``.gz`` or ``.bz2``.
+def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, whole: bool = True) -> bytes:
+    """Read a file, unpacked if its name ends in ``.gz`` or ``.bz2``; unless ``whole``, its first bytes only.
 
     It is read piece by piece, and no more than one piece beyond the limit is ever unpacked.
 
     Raises
     ------
     FormatError
-        On a missing file, a damaged archive, or more than ``max_bytes``.
+        On a missing file, a damaged archive, or (if ``whole``) more than ``max_bytes``.
     """
     kind = {".gz": "gzip", ".bz2": "bzip2"}.get(path.suffix, "")
     pieces: list[bytes] = []
     left = max_bytes
     try:
         with open_packed(path) as stream:
+            if not whole:
+                return stream.read(max_bytes)
             while piece := stream.read(_PIECE):
                 pieces.append(piece)
                 left -= len(piece)

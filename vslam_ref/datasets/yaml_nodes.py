@@ -5,7 +5,7 @@ OpenCV begins its files with ``%YAML:1.0``, which no YAML standard knows; that l
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -17,8 +17,7 @@ from vslam_ref.datasets.text import FormatError, decoded, number
 T = TypeVar("T")
 MAX_BYTES = 2**20
 LONGEST = 1e12
-MAX_DEPTH = 32
-"""Calibration and map files are flat and short: what is larger or deeper is another kind of file."""
+"""Calibration and map files are flat and short: what is larger is another kind of file."""
 
 
 class Node(NamedTuple):
@@ -139,7 +138,9 @@ def read_yaml(path: Path) -> Node:
         mark = error.problem_mark or error.context_mark
         what = f"{error.problem or error.context}; expected YAML"
         raise FormatError(path, mark.line + 1 if mark else None, _one_line(what)) from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
+    except RecursionError:
+        raise FormatError(path, None, "nested too deeply; is this the right file?") from None
+    except (yaml.YAMLError, ValueError) as error:
         raise FormatError(path, None, _one_line(f"{error}; expected YAML")) from None
     if raw is None:
         raise FormatError(path, None, "empty; expected YAML")
@@ -159,19 +160,7 @@ def _read_text(path: Path) -> str:
     if len(data) > MAX_BYTES:
         raise FormatError(path, None, f"more than {MAX_BYTES} bytes; is this the right file?")
     text = decoded(path, data)
-    for line, depth in _depths(text):
-        if depth > MAX_DEPTH:
-            raise FormatError(path, line, f"nested more than {MAX_DEPTH} deep; is this the right file?")
     return "#" + text[1:] if text.startswith("%YAML") else text
-
-
-def _depths(text: str) -> Iterator[tuple[int, int]]:
-    """How deep brackets or indentation may be nested at the end of each line."""
-    brackets = 0
-    for number_, line in enumerate(text.splitlines(), 1):
-        brackets += line.count("[") + line.count("{") - line.count("]") - line.count("}")
-        inside = max(line.count("[") + line.count("{"), line.count("- "))
-        yield number_, max(brackets, inside if brackets > 0 else line.count("- "), 0)
 
 
 def rigid(node: Node, T: Array) -> Array:

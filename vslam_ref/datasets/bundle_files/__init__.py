@@ -10,7 +10,7 @@ module        format                                          in, out  converts
 ``ply``       PLY: points and cameras, to look at             out      nothing
 ============  ==============================================  =======  =================================
 
-``anything`` chooses by the file's first bytes.  Every reader answers with :class:`BundleFile`; every error
+``by_content`` chooses by the file's first bytes.  Every reader answers with :class:`BundleFile`; every error
 is one line with file, line (of a binary file: what and where), and what is right.  Counts are compared with
 the file's size before anything is made for them, and archives are unpacked up to a limit only.  Points seen
 once, cameras without points and points behind cameras are no errors here: the adjustment names them.

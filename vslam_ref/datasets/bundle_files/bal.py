@@ -59,18 +59,12 @@ def read_bal(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
     data = load(path, max_bytes)
     views, points, seen = _counts(path, data)
     numbers = read_numbers(path, data)
-    told = f"3 counts, {seen} observations of 4, {views} cameras of 9, {points} points of 3"
-    numbers.require_count(3 + 4 * seen + 9 * views + 3 * points, told)
+    counts = f"3 counts, {seen} observations of 4, {views} cameras of 9, {points} points of 3"
+    numbers.require_count(3 + 4 * seen + 9 * views + 3 * points, counts)
     at = 3 + 4 * np.arange(seen)
     view = numbers.whole(at, "camera of an observation", views)
     point = numbers.whole(at + 1, "point of an observation", points)
-    require_once(
-        path,
-        view,
-        point,
-        lambda k: numbers.line(3 + 4 * k),
-        lambda k: f"camera {view[k]} sees point {point[k]}",
-    )
+    require_once(path, view, point, lambda k: numbers.line(3 + 4 * k))
     numbers.require_below(FARTHEST)
     uv = np.stack([numbers.values[at + 2], numbers.values[at + 3]], -1)
     cameras = _cameras(numbers, 3 + 4 * seen, views)
@@ -86,8 +80,8 @@ def _counts(path: Path, data: bytes) -> tuple[int, int, int]:
     if not found:
         line = data[: len(data) - len(data.lstrip())].count(b"\n") + 1
         shown = data.split(None, 3)[:3]
-        told = " ".join(word[:20].decode("ascii", "backslashreplace") for word in shown)
-        raise FormatError(path, line, f"{told!r}; expected three counts: {', '.join(COUNTS)}")
+        words = " ".join(word[:20].decode("ascii", "backslashreplace") for word in shown)
+        raise FormatError(path, line, f"{words!r}; expected three counts: {', '.join(COUNTS)}")
     line = data.count(b"\n", 0, found.start(1)) + 1
     views, points, seen = (int(word) for word in found.groups())
     if views == 0:
@@ -95,9 +89,9 @@ def _counts(path: Path, data: bytes) -> tuple[int, int, int]:
     if seen > views * points:
         what = f"{seen} observations of {points} points by {views} cameras; expected at most one each"
         raise FormatError(path, line, what)
-    told = f"{views} cameras, {points} points, {seen} observations"
+    counts = f"{views} cameras, {points} points, {seen} observations"
     # a number and the blank after it are two bytes at least
-    require_room(path, line, told, 2 * (3 + 9 * views + 3 * points + 4 * seen) - 1, len(data))
+    require_room(path, line, counts, 2 * (3 + 9 * views + 3 * points + 4 * seen) - 1, len(data))
     return views, points, seen
 
 
@@ -136,12 +130,8 @@ def write_bal(path: Path | str, file: BundleFile) -> None:
     cameras = np.column_stack([so3.log(FLIP @ T[:, :3, :3]), T[:, :3, 3] @ FLIP, lenses])
     views, points, seen = problem.sizes
     lines = [f"{views} {points} {seen}"]
-    rows = zip(
-        problem.seen.view.tolist(),
-        problem.seen.point.tolist(),
-        *(problem.seen.uv * DOWN).T.tolist(),
-        strict=True,
-    )
+    seen_by, point, (u, v) = problem.seen.view, problem.seen.point, (problem.seen.uv * DOWN).T
+    rows = zip(seen_by.tolist(), point.tolist(), u.tolist(), v.tolist(), strict=True)
     lines += [f"{i} {j} {u!r} {v!r}" for i, j, u, v in rows]
     lines += map(repr, cameras.ravel().tolist())
     lines += map(repr, problem.scene.X_world.ravel().tolist())

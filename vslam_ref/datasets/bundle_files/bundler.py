@@ -147,13 +147,7 @@ def _observations(
     at = counted_at[point] + 1 + PER_SIGHT * (np.arange(len(point)) - before[point])
     camera = numbers.whole(at, "camera of a sight", cameras)
     numbers.whole(at + 1, "key of a sight", 2**53, right="a whole number, 0 or more")
-    require_once(
-        numbers.path,
-        camera,
-        point,
-        lambda k: numbers.line(int(at[k])),
-        lambda k: f"camera {camera[k]} sees point {point[k]}",
-    )
+    require_once(numbers.path, camera, point, lambda k: numbers.line(int(at[k])))
     place = np.full(cameras, -1, dtype=np.int64)
     place[kept] = np.arange(len(kept))
     stays: NDArray[np.bool_] = place[camera] >= 0
@@ -166,8 +160,8 @@ def _names(path: Path, cameras: int) -> list[str]:
     """First word of each line."""
     lines = list(read_lines(path))
     if len(lines) != cameras:
-        told = f"{len(lines)} images; expected {cameras}, one for each camera"
-        raise FormatError(path, lines[-1][0] if lines else None, told)
+        what = f"{len(lines)} images; expected {cameras}, one for each camera"
+        raise FormatError(path, lines[-1][0] if lines else None, what)
     return [re.split(r"\s", text, maxsplit=1)[0] for _, text in lines]
 
 

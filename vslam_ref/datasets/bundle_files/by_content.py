@@ -1,8 +1,7 @@
-"""Any bundle file: the reader chosen by what the file begins with, the writer by the name."""
+"""Bundle files of any known format: the reader chosen by the file's first bytes, the writer by its name."""
 
 from __future__ import annotations
 
-import zlib
 from pathlib import Path
 
 from vslam_ref.datasets.bundle_files.bal import read_bal, write_bal
@@ -11,14 +10,14 @@ from vslam_ref.datasets.bundle_files.colmap import read_colmap, write_colmap
 from vslam_ref.datasets.bundle_files.libmv import ORDERS, SPACES, read_libmv
 from vslam_ref.datasets.bundle_files.ply import write_ply
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.datasets.text import FormatError, open_packed
+from vslam_ref.datasets.text import FormatError, read_bytes
 
 READERS = {"bal": read_bal, "bundler": read_bundler, "libmv": read_libmv, "colmap": read_colmap}
 RIGHT = "expected BAL (three counts), Bundler (# Bundle file v0.3), libmv (vP…), or a folder of COLMAP's text"
 
 
 def detect(path: Path | str) -> str:
-    """Tell the format from the first bytes: "bal", "bundler", "libmv", or "colmap" for a folder.
+    """Find the format by the first bytes: "bal", "bundler", "libmv", or "colmap" for a folder.
 
     Raises
     ------
@@ -28,14 +27,9 @@ def detect(path: Path | str) -> str:
     path = Path(path)
     if path.is_dir():
         return "colmap"
-    if not path.is_file():
+    if not path.exists():
         raise FormatError(path, None, "no such file or folder")
-    try:
-        with open_packed(path) as stream:
-            head = stream.read(256)
-    except (OSError, EOFError, zlib.error) as error:
-        told = " ".join(str(error).split())
-        raise FormatError(path, None, f"cannot be unpacked ({told}); fetch it again") from None
+    head = read_bytes(path, 256, whole=False)
     if head[:1] in ORDERS and head[1:2] in SPACES:
         return "libmv"
     start = head.lstrip()

@@ -48,20 +48,20 @@ def load(path: Path, max_bytes: int | None = None) -> bytes:
     return data
 
 
-def require_room(path: Path, line: int | None, told: str, needed: int, size: int) -> None:
+def require_room(path: Path, line: int | None, counts: str, needed: int, size: int) -> None:
     """Refuse counts that cannot fit the file, before anything of their size is made.
 
     Parameters
     ----------
     path, line
         Where the counts stand.
-    told : str
-        The counts, in words.
+    counts : str
+        In words.
     needed, size : int
         Bytes that they need at least, and that there are.
     """
     if needed > size:
-        what = f"{told} need at least {needed} bytes; the file has {size}: truncated, or a wrong count"
+        what = f"{counts} need at least {needed} bytes; the file has {size}: truncated, or a wrong count"
         raise FormatError(path, line, what)
 
 
@@ -80,15 +80,19 @@ def require_once(
     view: IntArray,
     point: IntArray,
     line: Callable[[int], int | None],
-    names: Callable[[int], str],
+    names: Callable[[int], str] | None = None,
 ) -> None:
-    """Refuse a point that one view sees twice; ``line`` and ``names`` tell of an observation by number."""
+    """Refuse a point that one view sees twice.
+
+    ``line(k)`` is the line of observation k, ``names(k)`` says who sees what (views are cameras by default).
+    """
     twice = repeated(view, point)
     if twice is not None:
         first, second = twice
         here, there = line(second), line(first)
         place = f"observation {first}" if there is None else f"line {there}"
-        raise FormatError(path, here, f"{names(second)} again; {place} has it already, expected it once")
+        who = names(second) if names else f"camera {view[second]} sees point {point[second]}"
+        raise FormatError(path, here, f"{who} again; {place} has it already, expected it once")
 
 
 def rotations(path: Path, R: Array, line: Callable[[int], int | None], what: str) -> Array:
@@ -107,6 +111,6 @@ def rotations(path: Path, R: Array, line: Callable[[int], int | None], what: str
         k = int(bad[0])
         with np.errstate(over="ignore", invalid="ignore"):
             determinant = np.linalg.det(R[k])
-        told = f"R of {what} {k} is no rotation: R^T R is off by {off[k]:.3g}, determinant {determinant:.3g}"
-        raise FormatError(path, line(k), f"{told}; expected 0 and 1")
+        found = f"R^T R is off by {off[k]:.3g}, determinant {determinant:.3g}; expected 0 and 1"
+        raise FormatError(path, line(k), f"R of {what} {k} is no rotation: {found}")
     return np.asarray(so3.nearest(R)) if len(R) else R

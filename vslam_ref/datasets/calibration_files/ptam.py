@@ -56,7 +56,7 @@ def read_ptam(path: Path | str, size: tuple[int, int]) -> CameraFile:
         raise FormatError(path, line, f"{VARIABLE} has {len(words)} numbers; {RIGHT}")
     *sensor, omega = numbers(path, line, words, ("fx", "fy", "cx", "cy", "omega"))
     try:
-        camera = Fov(*relative_sensor(sensor, size), abs(omega))
+        camera = Fov.from_params([*relative_sensor(sensor, size), abs(omega)])
     except ValueError as error:
         raise FormatError(path, line, str(error)) from None
     return CameraFile(camera, size)

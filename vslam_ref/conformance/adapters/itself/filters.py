@@ -31,9 +31,13 @@ def _slam(x: Array, P: Array) -> EkfSlam:
     return slam
 
 
+def _named(names: str, found: tuple[Array, Array]) -> dict[str, Array]:
+    """The first run of a mean and a covariance, by two names."""
+    return {name: value[0] for name, value in zip(names.split(), found, strict=True)}
+
+
 def _state(slam: EkfSlam) -> dict[str, Array]:
-    x, P = slam.blocks.full()
-    return {"x": x[0], "P": P[0]}
+    return _named("x P", slam.blocks.full())
 
 
 def _predict(
@@ -87,17 +91,11 @@ def _lifted(Z: Array, P: Array, control: str = "first_order") -> LiftedCarlemanE
 
 
 def _lifted_state(slam: LiftedCarlemanEkf) -> dict[str, Array]:
-    Z, P = slam.state()
-    return {"Z": Z[0], "P": P[0]}
+    return _named("Z P", slam.state())
 
 
 def _increment(increment: Array, cov: Array) -> vehicle.Increment:
     return vehicle.Increment(increment[None, 0], increment[None, 1], cov[None])
-
-
-def _lift(x: Array, P: Array) -> dict[str, Array]:
-    Z, P_Z = moments.lifted_start(x[None], P[None], "first_order")
-    return {"Z": Z[0], "P_Z": P_Z[0]}
 
 
 def _lifted_predict(
@@ -123,8 +121,7 @@ def _lifted_augment(Z: Array, P: Array, z: Array, cov_z: Array) -> dict[str, Arr
 def _pose(z: Array, P: Array) -> dict[str, Array]:
     Z, P_Z = np.zeros(lift.VEHICLE), np.zeros((lift.VEHICLE, lift.VEHICLE))
     Z[:4], P_Z[:4, :4] = z, P
-    mean, cov = _lifted(Z, P_Z).pose()
-    return {"x": mean[0], "P": cov[0]}
+    return _named("x P", _lifted(Z, P_Z).pose())
 
 
 def _reduced_predict(
@@ -151,18 +148,7 @@ def _ideal(x: Array, P: Array, truth: Array, landmarks: Array, **run: Any) -> St
 
 
 def _pose_steps(slam: SlamFilter, **run: Any) -> Steps:
-    poses = [step.pose() for step in _drive(slam, **run)]
-    return [{"x": pose.mean[0], "P": pose.cov[0]} for pose in poses]
-
-
-def _lift_gaussian(x: Array, P: Array) -> dict[str, Array]:
-    Z, P_Z = moments.lifted_start(x[None], P[None], "gaussian")
-    return {"Z": Z[0], "P_Z": P_Z[0]}
-
-
-def _reduced_start(x: Array, P: Array) -> dict[str, Array]:
-    m, P_m = start_moments(x[None], P[None], "gaussian")
-    return {"m": m[0], "P": P_m[0]}
+    return [_named("x P", step.pose()) for step in _drive(slam, **run)]
 
 
 TABLE: Answers = {
@@ -170,23 +156,21 @@ TABLE: Answers = {
     "vehicle.place": lambda x, z: observation.world_from_vehicle(x, z),
     "ekf.ideal_trace": _ideal,
     "lift.landmark": lambda x, landmark: lift.lift_landmark(x, landmark),
-    "lift.gaussian": _lift_gaussian,
+    "lift.gaussian": lambda x, P: _named("Z P_Z", moments.lifted_start(x[None], P[None], "gaussian")),
     "lift.gaussian_predict": lambda **inputs: _lifted_predict(control="gaussian", **inputs),
-    "reduced.start": _reduced_start,
+    "reduced.start": lambda x, P: _named("m P", start_moments(x[None], P[None], "gaussian")),
     "reduced.gaussian_predict": lambda **inputs: _reduced_predict(control="gaussian", **inputs),
     "consistency.anchored_trace": lambda x, P, **run: _pose_steps(AnchoredEkf(x, P), **run),
     "vehicle.ackermann": lambda x, control, wheelbase, track, dt: vehicle.propagate(
         x, vehicle.ackermann(control, wheelbase, dt)
     ),
-    "vehicle.front_wheel": lambda x, control, wheelbase, dt: vehicle.front_wheel_step(
-        x, control, wheelbase, dt
-    ),
+    "vehicle.front_wheel": lambda x, **drive: vehicle.front_wheel_step(x, **drive),
     "ekf.predict": _predict,
     "ekf.update": _update,
     "ekf.augment": _augment,
     "ekf.from_polar": _from_polar,
     "ekf.trace": _trace,
-    "lift.vehicle": _lift,
+    "lift.vehicle": lambda x, P: _named("Z P_Z", moments.lifted_start(x[None], P[None], "first_order")),
     "carleman.predict": _lifted_predict,
     "carleman.update": _lifted_update,
     "carleman.augment": _lifted_augment,

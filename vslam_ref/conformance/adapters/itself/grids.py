@@ -82,7 +82,7 @@ def _look(layers: Array, now: float, observation: str, config: map_config.MapCon
 
 TABLE: Answers = {
     "grid.log_odds": lambda probability: log_odds.log_odds(float(probability)),
-    "grid.probability": lambda log_odds: _probability(log_odds),
+    "grid.probability": log_odds.probability,
     "grid.update": lambda prior, measured: recursion.recursion(
         log_odds.log_odds(measured), 0.0, log_odds.log_odds(prior)
     ),
@@ -90,12 +90,6 @@ TABLE: Answers = {
     "grid.static_dynamic": _static_dynamic,
     "grid.history": _history,
     "grid.explained": _explained,
-    "grid.recursion": lambda table, transition, prediction: recursion.recursion(
-        table, transition, prediction
-    ),
+    "grid.recursion": recursion.recursion,
     "grid.ray_cells": lambda start, end: rays.crossed_cells(start, [end]).cells[:, ::-1],
 }
-
-
-def _probability(L: float) -> Array:
-    return log_odds.probability(L)

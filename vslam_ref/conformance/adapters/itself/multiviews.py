@@ -90,11 +90,9 @@ TABLE: Answers = {
     "multiview.alignment_error": lambda source, target, with_scale: (
         align(source, target, with_scale=bool(with_scale)).rmse
     ),
-    "multiview.pose_from_centre": lambda R_cam_world, p_world: pose_from_centre(R_cam_world, p_world),
-    "multiview.epipolar_distance": lambda F, uv_a, uv_b: epipolar_distance(F, uv_a, uv_b),
-    "multiview.sampson_distance": lambda F, uv_a, uv_b: sampson_distance(F, uv_a, uv_b),
-    "multiview.midpoint": lambda p_a, b_a, p_b, b_b: midpoint(p_a, b_a, p_b, b_b),
-    "multiview.camera_from_world": lambda R_cam_world, p_world, X_world: camera_from_world(
-        R_cam_world, p_world, X_world
-    ),
+    "multiview.pose_from_centre": pose_from_centre,
+    "multiview.epipolar_distance": epipolar_distance,
+    "multiview.sampson_distance": sampson_distance,
+    "multiview.midpoint": midpoint,
+    "multiview.camera_from_world": camera_from_world,
 }

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.datasets.bundle_files.colmap.models import HALF, PARAMETERS, common_model, params_from_colmap
+from vslam_ref.datasets.bundle_files.colmap.models import HALF, MODELS, common_model, params_from_colmap
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, UNIT_TOLERANCE, load, require_once
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.text import FormatError, decoded, number
@@ -138,9 +138,10 @@ def _cameras(path: Path, max_bytes: int | None) -> dict[int, _Camera]:
     found: dict[int, _Camera] = {}
     right = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS"
     for line, key, words in _records(path, _lines(path, max_bytes), right, lambda n: n >= 4):
-        model, names = words[1], PARAMETERS.get(words[1])
-        if names is None:
-            raise FormatError(path, line, f"MODEL is {model[:40]!r}; expected one of {', '.join(PARAMETERS)}")
+        model = words[1]
+        if model not in MODELS:
+            raise FormatError(path, line, f"MODEL is {model[:40]!r}; expected one of {', '.join(MODELS)}")
+        names = MODELS[model].parameters
         size = tuple(_whole(path, line, words[k], name) for k, name in ((2, "WIDTH"), (3, "HEIGHT")))
         if len(words) - 4 != len(names):
             right = f"expected {len(names)} for {model}: {', '.join(names)}"
