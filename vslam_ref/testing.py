@@ -158,6 +158,7 @@ def _central(
             behind[j] -= step
             f_ahead, f_behind = np.asarray(function(ahead), float), np.asarray(function(behind), float)
             size = max(size, np.abs(f_ahead).max(), np.abs(f_behind).max())
+            # eq-difference-quotient
             slopes.append(subtract(f_ahead, f_behind) / (ahead[j] - behind[j]))
         once = [(4 * slopes[1] - slopes[0]) / 3, (4 * slopes[2] - slopes[1]) / 3]
         columns.append((16 * once[1] - once[0]) / 15)

@@ -162,6 +162,7 @@ def _arrays(where: str, want: Array, have: Array, tolerance: tuple[float, float]
     if not same_odd or not np.isfinite(have[finite]).all():
         return Difference(False, where, have.tolist(), want.tolist(), float("inf"), 0.0)
     relative, absolute = tolerance
+    # eq-vector-tolerance
     allowed = absolute + relative * float(np.abs(want[finite]).max(initial=0.0))
     size = float(np.abs(want - have)[finite].max(initial=0.0))
     if size <= allowed:

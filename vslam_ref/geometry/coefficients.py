@@ -29,7 +29,10 @@ _POWERS = 19  # the first one left out is 190 / 21! < 4e-18, in C at theta = 0, 
 
 
 def rotation_coefficients(theta2: Array) -> Array:
-    """c_0 ... c_5 of squared angles, shape (...) -> (6, ...)."""
+    """c_0 ... c_5 of squared angles, rad^2, shape (...) -> (6, ...).
+
+    Implements :eq:`eq-coefficients`.
+    """
     small = theta2 < SMALL**2
     c = np.empty((6, *theta2.shape))
     # small: two series at the top, then downwards
@@ -99,6 +102,7 @@ def _power_sums(sigma: Array, theta2: Array) -> tuple[Array, Array]:
     a, b, c = np.ones_like(sigma), np.zeros_like(sigma), np.zeros_like(sigma)
     B, C = np.zeros_like(sigma), np.zeros_like(sigma)
     for n in range(1, _POWERS + 1):
+        # eq-cube
         a, b, c = sigma * a, a + sigma * b - theta2 * c, b + sigma * c
         B, C = B + b / factorial(n + 1), C + c / factorial(n + 1)
     return B, C

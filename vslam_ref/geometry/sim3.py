@@ -165,7 +165,8 @@ def left_jacobian(xi: ArrayLike) -> Array:
     part = as_array("xi", xi, 7) / 2**_HALVINGS
     A, one = ad(part), np.eye(DOF)
     J = np.broadcast_to(one, A.shape)
-    for n in range(_TERMS + 1, 1, -1):  # Horner: I + A/2 (I + A/3 (I + ...))
+    # eq-left-jacobian, by Horner's rule: I + A/2 (I + A/3 (I + ...))
+    for n in range(_TERMS + 1, 1, -1):
         J = one + A @ J / n
     for _ in range(_HALVINGS):
         J = (J + adjoint(exp(part)) @ J) / 2

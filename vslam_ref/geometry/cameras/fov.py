@@ -71,6 +71,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
     xn, front = normalise(X_cam)
     A = tan_ratio(omega)
     S, _ = arctan_ratio((omega * A) ** 2 * (xn * xn).sum(-1))
+    # eq-fov-factor
     return Distorted(xn * (A * S)[..., None], np.broadcast_to(front, S.shape))
 
 
@@ -85,6 +86,7 @@ def distort_with_jacobians(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians
     A, dA = tan_ratio(omega), tan_ratio_slope(omega)
     T, q = omega * A, (xn * xn).sum(-1)
     S, dS = arctan_ratio(T * T * q)
+    # eq-fov-factor
     F, dF_dq = A * S, A * dS * T * T
     J = F[..., None, None] * np.eye(2) + 2 * dF_dq[..., None, None] * xn[..., :, None] * xn[..., None, :]
     dF_domega = dA * S + A * dS * 2 * T * (1 + T * T / 4) * q
