@@ -44,7 +44,7 @@ BLOCKS = {"SE2": {"rho": 2, "phi": 1}, "SE3": {"rho": 3, "phi": 3}, "Sim3": {"rh
 """Length of each block of a tangent vector, in our order."""
 
 
-class Convention(NamedTuple):
+class TangentConvention(NamedTuple):
     """How a library writes a small change of a pose.
 
     ``side`` is ``left`` (Exp(xi) T), ``right`` (T Exp(xi)) or ``split`` (R from the left, rho added to t).
@@ -59,26 +59,26 @@ class Convention(NamedTuple):
 
 _TURN_FIRST = ("phi", "rho")
 CONVENTIONS = {
-    "vslam_ref.se3": Convention("SE3"),
-    "gtsam.Pose3": Convention("SE3", _TURN_FIRST, "right"),
-    "g2o.VertexSE3": Convention("SE3", side="right", angle_unit=0.5),
-    "g2o.VertexSE3Expmap": Convention("SE3", _TURN_FIRST),
-    "sophus.SE3": Convention("SE3"),
-    "sophus.Manifold<SE3>": Convention("SE3", side="right"),
-    "manif.SE3": Convention("SE3", side="right"),
-    "ceres.Quaternion+R3": Convention("SE3", _TURN_FIRST, "split", 0.5),
-    "vslam_ref.se2": Convention("SE2"),
-    "gtsam.Pose2": Convention("SE2", side="right"),
-    "g2o.VertexSE2": Convention("SE2", side="split"),
-    "manif.SE2": Convention("SE2", side="right"),
-    "vslam_ref.sim3": Convention("Sim3", ("rho", "phi", "sigma")),
-    "gtsam.Similarity3": Convention("Sim3", (*_TURN_FIRST, "sigma"), "right"),
-    "g2o.VertexSim3Expmap": Convention("Sim3", (*_TURN_FIRST, "sigma")),
-    "sophus.Sim3": Convention("Sim3", ("rho", "phi", "sigma")),
+    "vslam_ref.se3": TangentConvention("SE3"),
+    "gtsam.Pose3": TangentConvention("SE3", _TURN_FIRST, "right"),
+    "g2o.VertexSE3": TangentConvention("SE3", side="right", angle_unit=0.5),
+    "g2o.VertexSE3Expmap": TangentConvention("SE3", _TURN_FIRST),
+    "sophus.SE3": TangentConvention("SE3"),
+    "sophus.Manifold<SE3>": TangentConvention("SE3", side="right"),
+    "manif.SE3": TangentConvention("SE3", side="right"),
+    "ceres.Quaternion+R3": TangentConvention("SE3", _TURN_FIRST, "split", 0.5),
+    "vslam_ref.se2": TangentConvention("SE2"),
+    "gtsam.Pose2": TangentConvention("SE2", side="right"),
+    "g2o.VertexSE2": TangentConvention("SE2", side="split"),
+    "manif.SE2": TangentConvention("SE2", side="right"),
+    "vslam_ref.sim3": TangentConvention("Sim3", ("rho", "phi", "sigma")),
+    "gtsam.Similarity3": TangentConvention("Sim3", (*_TURN_FIRST, "sigma"), "right"),
+    "g2o.VertexSim3Expmap": TangentConvention("Sim3", (*_TURN_FIRST, "sigma")),
+    "sophus.Sim3": TangentConvention("Sim3", ("rho", "phi", "sigma")),
 }
 
 
-def _convention(name: str) -> Convention:
+def _convention(name: str) -> TangentConvention:
     if name not in CONVENTIONS:
         raise ValueError(f"convention {name!r} is unknown; there are: {', '.join(CONVENTIONS)}")
     return CONVENTIONS[name]
@@ -88,7 +88,7 @@ def _inverse(M: Array) -> Array:
     return np.asarray(np.linalg.inv(M))
 
 
-def _from_left(convention: Convention, Ad: Array) -> Array:
+def _from_left(convention: TangentConvention, Ad: Array) -> Array:
     """Matrix that takes our left perturbation of T to the convention's, Ad that of T."""
     sizes = BLOCKS[convention.group]
     n, turn = sum(sizes.values()), slice(sizes["rho"], sizes["rho"] + sizes["phi"])

@@ -66,7 +66,7 @@ def check_jacobian(
     roundings : int
         How many rounding errors one evaluation may gather.
     difference : callable, optional
-        Difference of two values (m,) for outputs that are no vectors, such as angles: ``difference(a, b)``
+        Difference of two values (m,) for outputs that are not vectors, such as angles: ``difference(a, b)``
         is the small vector from b to a.  Central differences only.
 
     Returns
@@ -200,7 +200,7 @@ def assert_consistent(nees: ArrayLike, dof: int, *, false_alarm: float = 1e-3) -
     AssertionError
         Outside the band, or a value that is not finite.
     ValueError
-        If ``nees`` is not (M,) with M >= 1: points of time are no independent runs.
+        If ``nees`` is not (M,) with M >= 1: points in time are not independent runs.
 
     Examples
     --------
@@ -230,7 +230,7 @@ def assert_consistent(nees: ArrayLike, dof: int, *, false_alarm: float = 1e-3) -
 
 
 def assert_group_axioms(group: Any, samples: ArrayLike, *, roundings: int = 64) -> float:
-    r"""Fail when a module of functions on group elements is no group of matrices.
+    r"""Fail when a module of functions on group elements is not a group of matrices.
 
     The module must have ``identity``, ``compose``, ``inverse`` and ``matrix``; ``exp`` and ``log``, and
     ``adjoint``, are checked where they exist.  Everything is compared as matrices, where the

@@ -48,7 +48,7 @@ def test_jacobians_of_every_convention_come_home(transform: Any, side: Any, orde
     pose = np.array(sent["pose"])
     assert np.abs(pose - (se3.inverse(POSE) if transform == "world_from_cam" else POSE)).max() < 1e-15
     house = projection.pixel_from_world_with_jacobians(PARAMS, POSE, X, lens=Pinhole.lens).J_pose
-    theirs = np.array(convention._out("pose_jacobian", house.tolist(), inputs))
+    theirs = np.array(convention.converted("pose_jacobian", house.tolist(), inputs))
     check_jacobian(lambda eta: programs_pixel(convention, pose, eta), np.zeros(6), theirs, method="central")
     home = convention.outputs(JACOBIAN, {"J": theirs.tolist()}, inputs)["J"]
     assert np.abs(np.array(home) - house).max() < 1e-11
@@ -63,7 +63,7 @@ def test_covariances_of_every_convention_come_home(transform: Any, side: Any, or
     inputs = {"pose": POSE.tolist(), "P": (A @ A.T).tolist(), "X_world": X.tolist()}
     theirs = np.array(convention.inputs(COVARIANCE, inputs)["P"])
     house = projection.pixel_from_world_with_jacobians(PARAMS, POSE, X, lens=Pinhole.lens).J_pose
-    J = np.array(convention._out("pose_jacobian", house.tolist(), inputs))
+    J = np.array(convention.converted("pose_jacobian", house.tolist(), inputs))
     assert np.allclose(J @ theirs @ J.T, house @ A @ A.T @ house.T, rtol=1e-12)
     home = convention.outputs(COVARIANCE, {"P": theirs.tolist()}, inputs)["P"]
     assert np.allclose(home, A @ A.T, rtol=1e-12, atol=1e-12)
@@ -93,18 +93,18 @@ def test_covariances_of_every_convention_come_home(transform: Any, side: Any, or
     ],
 )
 def test_there_and_back(convention: Convention, kind: str, house: Any, program: Any) -> None:
-    assert np.array_equal(convention._out(kind, house, {}), program)
-    assert np.array_equal(convention._home(kind, program, {}), house)
+    assert np.array_equal(convention.converted(kind, house, {}), program)
+    assert np.array_equal(convention.converted(kind, program, {}, home=True), house)
 
 
 def test_tangent_matrices_are_permuted_on_both_sides() -> None:
     """Ad T in the other order acts as in ours."""
     convention = Convention(tangent_order="rotation_first")
     A = se3.adjoint(POSE)
-    theirs = np.array(convention._out("tangent_matrix", A.tolist(), {}))
+    theirs = np.array(convention.converted("tangent_matrix", A.tolist(), {}))
     xi = np.arange(6.0)
     assert np.allclose(theirs @ xi[SWAP], (A @ xi)[SWAP])
-    assert np.array_equal(convention._home("tangent_matrix", theirs.tolist(), {}), A)
+    assert np.array_equal(convention.converted("tangent_matrix", theirs.tolist(), {}, home=True), A)
 
 
 def test_convention_files(tmp_path: Path) -> None:

@@ -195,7 +195,7 @@ def test_the_command_tells_the_verdict_by_its_status(tmp_path: Path, capsys: Any
 DAMAGES = {
     "empty": (lambda lines: [], "no line of numbers"),
     "short line": (lambda lines: [*lines[:4], lines[4].rpartition(",")[0]], ":5: 7 columns; need 8"),
-    "word": (lambda lines: [*lines[:3], lines[3].replace("0.0", "zero", 1)], "is no number"),
+    "word": (lambda lines: [*lines[:3], lines[3].replace("0.0", "zero", 1)], "is not a number"),
     "not finite": (lambda lines: [*lines[:2], ",".join(["nan"] * 8)], ":3: a number is not finite"),
     "twice": (lambda lines: [*lines, lines[-1]], "is twice or more"),
     "a step missing": (lambda lines: lines[:-1], "is not there"),
@@ -222,8 +222,8 @@ def test_damaged_archives_are_told_in_one_line(tmp_path: Path, capsys: Any) -> N
     cases = {
         "no array 'step'": {name: value for name, value in good.items() if name != "step"},
         "need (N,), (N,), (N, d) and (N, d, d)": {**good, "covariance": good["covariance"][:, 0]},
-        "'error' is no array of numbers": {**good, "error": np.array([{"a": 1}] * 60, dtype=object)},
-        "'run' is no array of numbers": {**good, "run": good["run"].astype(str)},
+        "'error' is not an array of numbers": {**good, "error": np.array([{"a": 1}] * 60, dtype=object)},
+        "'run' is not an array of numbers": {**good, "run": good["run"].astype(str)},
         "'error' has a number that is not finite": {**good, "error": good["error"] * np.inf},
     }
     for message, content in cases.items():
@@ -249,7 +249,7 @@ def test_a_header_that_promises_too_much_allocates_nothing(tmp_path: Path, capsy
                 assert b"60000000000" in content
             new.writestr(info.filename, content)
     assert main(["verify", "--nees", str(tmp_path / "big.npz")]) == 2
-    assert "'run' is no array of numbers" in capsys.readouterr().err
+    assert "'run' is not an array of numbers" in capsys.readouterr().err
 
 
 def test_bad_use_is_told(tmp_path: Path, capsys: Any) -> None:

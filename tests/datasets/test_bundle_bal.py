@@ -217,18 +217,18 @@ def replaced(line: int, words: str) -> str:
         (replaced(4, "0 5 1.0 2.0"), 4, "point of an observation is 5; expected a whole number from 0 to 4"),
         (replaced(4, "0 2.5 1.0 2.0"), 4, "point of an observation is 2.5"),
         (replaced(4, "0 0 1.0 2.0"), 4, "camera 0 sees point 0 again; line 2 has it already"),
-        (replaced(4, "0 2 nan 2.0"), 4, "'nan' is no number"),
-        (replaced(4, "0 2 inf 2.0"), 4, "'inf' is no number"),
-        (replaced(4, "0 2 1e999 2.0"), 4, "'1e999' is no number; expected a finite number"),
-        (replaced(4, "0 2 1_0 2.0"), 4, "'1_0' is no number"),
-        (replaced(4, "0 2 - 2.0"), 4, "'-' is no number"),
-        (replaced(4, "0 2 1.0 2.0 # seen"), 4, "'#' is no number"),
+        (replaced(4, "0 2 nan 2.0"), 4, "'nan' is not a number"),
+        (replaced(4, "0 2 inf 2.0"), 4, "'inf' is not a number"),
+        (replaced(4, "0 2 1e999 2.0"), 4, "'1e999' is not a number; expected a finite number"),
+        (replaced(4, "0 2 1_0 2.0"), 4, "'1_0' is not a number"),
+        (replaced(4, "0 2 - 2.0"), 4, "'-' is not a number"),
+        (replaced(4, "0 2 1.0 2.0 # seen"), 4, "'#' is not a number"),
         (replaced(4, "0 2 1e20 2.0"), 4, "a number is 1e+20; expected less than 1e+15"),
         (replaced(4, "0 2 " + "1" * 500 + " 2.0"), 4, "a word of 500 characters"),
         (replaced(BODY + 1, "2e6"), BODY + 1, "rotation vector is 2e+06; expected radians below 1e6"),
         (replaced(BODY + 7, "0"), BODY + 7, "focal length is 0; expected more than 0 pixels"),
         (replaced(BODY + 16, "-500.0"), BODY + 16, "focal length is -500"),
-        (TEXT.encode().replace(b"\n", b"\n\xff", 4), 2, "'\\\\xff0' is no number"),
+        (TEXT.encode().replace(b"\n", b"\n\xff", 4), 2, "'\\\\xff0' is not a number"),
         (TEXT.encode().replace(b" ", b"\x00", 1), 1, "expected three counts"),
     ],
 )
@@ -250,7 +250,7 @@ def test_an_error_at_the_end_of_a_large_file_is_found_as_fast_as_the_file_is_rea
     text = f"1 150000 150000\n{rows}" + "0 0 0 0 0 0 500 0 0\n" + "0 0 1\n" * 149_999
     path = written(tmp_path, text + "0 0 x\n")
     begin = time.process_time()
-    with pytest.raises(FormatError, match=r":300002: 'x' is no number"):
+    with pytest.raises(FormatError, match=r":300002: 'x' is not a number"):
         read_bal(path)
     path.write_text(text + "0 0\n")
     with pytest.raises(FormatError, match=r":300001: the file ends after|:300002: the file ends after"):

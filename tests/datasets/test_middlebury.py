@@ -46,9 +46,9 @@ def test_every_number_is_in_its_place(path: Path) -> None:
         ("b.png", "a.png", 3, "a.png comes twice"),
         ("1500 0 300", "1500 2 300", 2, "K is not"),
         ("1500 0 300", "-1500 0 300", 2, "focal lengths -1500, 1510; must be more than 0"),
-        ("0 -1 0 1 0 0 0 0 1", "0 1 0 1 0 0 0 0 1", 3, "R is no rotation: .*determinant -1"),
-        ("0 -1 0 1 0 0 0 0 1", "0 -2 0 1 0 0 0 0 1", 3, "R is no rotation: R R.T is off by 3"),
-        ("0 -1 0 1 0 0 0 0 1", "0 -1e300 0 1 0 0 0 0 1e300", 3, "R is no rotation"),
+        ("0 -1 0 1 0 0 0 0 1", "0 1 0 1 0 0 0 0 1", 3, "R is not a rotation: .*determinant -1"),
+        ("0 -1 0 1 0 0 0 0 1", "0 -2 0 1 0 0 0 0 1", 3, "R is not a rotation: R R.T is off by 3"),
+        ("0 -1 0 1 0 0 0 0 1", "0 -1e300 0 1 0 0 0 0 1e300", 3, "R is not a rotation"),
     ],
 )
 def test_a_damaged_file_is_told_with_its_line(path: Path, old: str, new: str, line: int, words: str) -> None:

@@ -9,7 +9,7 @@ RL    real logs at 0.1 m: scans a second into S and D; 20 NumPy, 200 Numba
 
 The peer is the way in which teaching code does it (that of PythonRobotics' ray casting grid map): for every
 beam a list of the cells of Bresenham's line, for every cell of the list a free value, for every end four
-occupied cells.  PythonRobotics is no package that could be installed, so the same algorithm is written here.
+occupied cells.  PythonRobotics cannot be installed as a package, so the same algorithm is written here.
 It does less than we do: its lines leave out cells that a beam cuts, and it adds no evidence.
 
 The ratio of OG-1 is that of the plain grid (one log-odds addition per cell).  S and D are shown beside it.

@@ -1,6 +1,6 @@
 """What a program can be asked: the functions, their inputs and outputs, and what kind of quantity each is.
 
-The list is ``functions.json`` beside this file, so that other languages can read it too.  A kind tells how
+The list is ``functions.json`` beside this file, so that other languages can read it too.  A kind says how
 a quantity changes with the convention of a program (:mod:`.conventions`): a ``tangent`` is permuted where
 rotations come first, a ``quaternion`` where w is last, a ``pose`` inverted where it is ``T_world_cam``.
 """

@@ -42,13 +42,13 @@ def numbers(value: Any) -> Array:
         return np.stack(parts) if parts else np.zeros(0)
     if isinstance(value, str):
         if value not in WORDS:
-            raise ValueError(f"{value!r} is no number")
+            raise ValueError(f"{value!r} is not a number")
         return np.array(WORDS[value])
     if isinstance(value, bool | int | float | np.generic):
         return np.array(float(value))
     if isinstance(value, np.ndarray):
         return value.astype(np.float64)
-    raise ValueError(f"{type(value).__name__} is no number")
+    raise ValueError(f"{type(value).__name__} is not a number")
 
 
 def compare(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Difference:
@@ -122,7 +122,7 @@ def _same_side(expected: Any, got: Any) -> Any:
 
 
 def _table(text: str) -> list[list[float]] | str:
-    """Rows of numbers of a text without its comments; the text itself where a word is no number."""
+    """Rows of numbers of a text without its comments; the text itself where a word is not a number."""
     lines = (line.partition("#")[0].replace(",", " ").split() for line in text.splitlines())
     try:
         return [[float(word) for word in words] for words in lines if words]
@@ -131,7 +131,7 @@ def _table(text: str) -> list[list[float]] | str:
 
 
 def _value(where: str, expected: Any, got: Any, tolerance: tuple[float, float]) -> Difference:
-    """Compare one output; a list of records (a trace) record by record, the first that differs is told."""
+    """Compare one output; of a list of records (a trace), the first that differs is reported."""
     if isinstance(expected, list) and expected and isinstance(expected[0], dict):
         if not isinstance(got, list) or len(got) != len(expected):
             length = len(got) if isinstance(got, list) else type(got).__name__
@@ -151,8 +151,8 @@ def _value(where: str, expected: Any, got: Any, tolerance: tuple[float, float]) 
     except ValueError as error:
         return Difference(False, f"{where}: {error}", got, expected, float("inf"), 0.0)
     if want.shape != have.shape:
-        told = f"{where}: shape {list(have.shape)}, expected {list(want.shape)}"
-        return Difference(False, told, got, expected, float("inf"), 0.0)
+        shown = f"{where}: shape {list(have.shape)}, expected {list(want.shape)}"
+        return Difference(False, shown, got, expected, float("inf"), 0.0)
     return _arrays(where, want, have, tolerance)
 
 

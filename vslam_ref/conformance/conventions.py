@@ -77,16 +77,16 @@ class Convention:
 
     def inputs(self, function: Function, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Inputs in the program's form."""
-        return {name: self._converted(kind, inputs[name], inputs) for name, kind in function.inputs.items()}
+        return {name: self.converted(kind, inputs[name], inputs) for name, kind in function.inputs.items()}
 
     def outputs(
         self, function: Function, outputs: Mapping[str, Any], inputs: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Outputs of a program in the house's form; ``inputs`` are the house's."""
         known = {name: kind for name, kind in function.outputs.items() if name in outputs}
-        return {name: self._converted(kind, outputs[name], inputs, home=True) for name, kind in known.items()}
+        return {name: self.converted(kind, outputs[name], inputs, home=True) for name, kind in known.items()}
 
-    def _converted(self, kind: str, value: Any, inputs: Mapping[str, Any], *, home: bool = False) -> Any:
+    def converted(self, kind: str, value: Any, inputs: Mapping[str, Any], *, home: bool = False) -> Any:
         """One quantity, from the house's form to the program's, or back ``home``."""
         about = "tangent_order" if kind.startswith("tangent") else CHANGED_BY.get(kind)
         on_pose = kind in ON_POSES

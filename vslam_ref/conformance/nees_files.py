@@ -43,7 +43,7 @@ class Runs(NamedTuple):
 
 
 def read(path: Path, dof: int | None = None) -> Runs:
-    """Read runs; the suffix ``.npz`` tells the format.
+    """Read runs; the suffix ``.npz`` says the format.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _rows(path: Path) -> Iterator[tuple[int, list[float]]]:
                     first = False  # the names of the columns
                     continue
                 bad = next(word for word in words if not is_number(word))
-                raise ValueError(f"{path}:{number}: {bad[:40]!r} is no number") from None
+                raise ValueError(f"{path}:{number}: {bad[:40]!r} is not a number") from None
             if not all(map(math.isfinite, values)):
                 raise ValueError(f"{path}:{number}: a number is not finite")
             first = False
@@ -137,7 +137,7 @@ def _npz(path: Path) -> tuple[Array, Array, Array, Array]:
 
 
 def _member(path: Path, archive: zipfile.ZipFile, name: str) -> Array:
-    """One array; what its header promises must be there before anything is allocated."""
+    """One array; what its header promises must be there before memory is allocated."""
     info = archive.getinfo(f"{name}.npy")
     if info.file_size > LARGEST:
         raise ValueError(f"{path}: array {name!r} has {info.file_size} bytes; at most {LARGEST} are read")
@@ -153,7 +153,7 @@ def _member(path: Path, archive: zipfile.ZipFile, name: str) -> Array:
             raise ValueError(f"{math.prod(shape)} of {dtype} in {len(content)} bytes")
         values = np.load(io.BytesIO(content), allow_pickle=False).astype(np.float64)
     except ValueError as error:
-        raise ValueError(f"{path}: array {name!r} is no array of numbers ({str(error)[:80]})") from None
+        raise ValueError(f"{path}: array {name!r} is not an array of numbers ({str(error)[:80]})") from None
     if not np.isfinite(values).all():
         raise ValueError(f"{path}: array {name!r} has a number that is not finite")
     return np.asarray(values)

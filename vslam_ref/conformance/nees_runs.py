@@ -2,7 +2,7 @@ r"""Is a filter honest?  A two-sided verdict on its simulated runs.
 
 The NEES of a run, averaged over a window of T steps, has the mean d if the filter is honest.  How far the
 mean over M runs may stray depends on how many of the steps are independent: the mean is chi-squared with M d
-degrees of freedom, over M, if all steps repeat the first, and with M T d if none knows of another.  Neither
+degrees of freedom, over M, if all steps repeat the first, and with M T d if all are independent.  Neither
 is true.  With the errors whitened by the filter's own covariance, w, jointly Gaussian, the variance of a
 run's average is
 
@@ -15,7 +15,7 @@ is divided by the square of the level.
 
 Intervals over whole runs need no such assumption, but NEES is lopsided, and with few runs they miss too often
 on one side: with 10 runs and strongly correlated steps Student's, meant to miss by 0.5 % on each, missed by
-3 % on the lower one.  So the bootstrap over whole runs tells how *large* the fault is, and the band decides.
+3 % on the lower one.  So the bootstrap over whole runs says how *large* the fault is, and the band decides.
 
 Three windows, the first, the middle and the last third of the steps, share the false-alarm rate equally
 (Bonferroni): a filter that is bold at first and shy at the end is not honest on average.  In simulations with
@@ -109,7 +109,7 @@ class Judgement(NamedTuple):
 
     @property
     def consistent(self) -> bool:
-        """Whether the filter is honest, as far as these runs tell."""
+        """Whether the filter is honest, as far as these runs show."""
         return self.verdict == "consistent"
 
     def numbers(self) -> dict[str, Any]:
@@ -155,7 +155,7 @@ def judge(runs: Runs, false_alarm: float = FALSE_ALARM, seed: int = 0) -> Judgem
     """
     M, T, d = runs.error.shape
     if M < FEWEST_RUNS:
-        raise ValueError(f"{M} runs: need {FEWEST_RUNS} at least to tell a fault from chance")
+        raise ValueError(f"{M} runs: need {FEWEST_RUNS} at least to distinguish a fault from chance")
     if not 0 < false_alarm < 1:
         raise ValueError(f"false alarm rate {false_alarm!r}: must lie between 0 and 1")
     squares = consistency.nees(runs.error, runs.covariance)

@@ -1,4 +1,4 @@
-"""Asking a foreign program: one line of JSON each way, and nothing it does can hurt.
+"""Asking a foreign program: one line of JSON each way; its failures become replies.
 
 * Request: ``{"id": "…", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}``
 * Reply: ``{"id": "…", "value": {"R": [[…], […], […]]}}``, or ``{"id": "…", "unsupported": true}``, or

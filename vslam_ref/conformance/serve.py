@@ -3,8 +3,8 @@
     python -m vslam_ref.conformance.serve my_package.adapter      # or my_adapter.py
 
 This is the example of the protocol in Python.  Nothing but replies may go to standard output; what the module
-prints is sent to standard error.  Zero or more blank lines are skipped; a line that is no request is answered
-with an error, without an id.
+prints is sent to standard error.  Blank lines are skipped; a line that is not a request is answered with an
+error, without an id.
 """
 
 from __future__ import annotations

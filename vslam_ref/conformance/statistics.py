@@ -32,7 +32,7 @@ def mean_square(x: Array) -> float:
 
 
 def mean_fourth(x: Array) -> float:
-    """Mean fourth power of all entries: it tells a uniform from a Gaussian distribution."""
+    """Mean fourth power of all entries: it separates a uniform from a Gaussian distribution."""
     return float((x**4).mean())
 
 

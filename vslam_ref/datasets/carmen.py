@@ -97,7 +97,7 @@ def read(path: Path, max_bytes: int = MAX_BYTES) -> CarmenLog:
     ------
     FormatError
         If the file has no scan, a scan has not as many words as it should, or another number of beams than
-        those before; if a reading is no number, or a pose or a time no finite number.
+        those before; if a reading is not a number, or a pose or a time no finite number.
     OSError
         If the file cannot be read.
     """

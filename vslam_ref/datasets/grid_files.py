@@ -74,8 +74,8 @@ def read_ros_map(path: Path) -> LogOddsGrid:
     Raises
     ------
     FormatError
-        If the YAML lacks a key or holds a wrong value, if the picture is missing or none, or if the origin
-        is turned or not on the lattice of the resolution.
+        If the YAML lacks a key or holds a wrong value, if the picture is missing or unreadable, or if the
+        origin is turned or not on the lattice of the resolution.
     """
     top = read_yaml(path)
     resolution, at = top.get("resolution").number(), top.get("origin")

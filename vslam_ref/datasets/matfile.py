@@ -40,7 +40,7 @@ COMPLEX = 0x0800
 
 
 class _DamagedError(Exception):
-    """The file is no MATLAB file; the text says why."""
+    """Not a MATLAB file; the text says why."""
 
 
 class _Variable(NamedTuple):
@@ -56,7 +56,7 @@ class _Variable(NamedTuple):
 def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """Read the named variables, each a row or column of finite numbers, as float vectors (n,).
 
-    The head is looked at first: a variable that is no plain numeric vector of bounded size is never
+    The head is looked at first: a variable that is not a plain numeric vector of bounded size is never
     made into numbers.
 
     Raises
@@ -75,9 +75,9 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     for name in names:
         mine = [variable for variable in found if variable.name == name]
         if len(mine) != 1:
-            told = ", ".join(variable.name for variable in found) or "none"
+            shown = ", ".join(variable.name for variable in found) or "none"
             what = f"variable {name!r} comes {len(mine)} times" if mine else f"no variable {name!r}"
-            raise FormatError(path, None, f"{what}; found {told}")
+            raise FormatError(path, None, f"{what}; found {shown}")
         vectors[name] = _vector(path, mine[0], order)
     lengths = {name: len(vector) for name, vector in vectors.items()}
     if len(set(lengths.values())) > 1:
@@ -151,11 +151,11 @@ def _variable(content: bytes, order: str) -> _Variable:
     kind = NUMERIC.get(code) or OTHER.get(code, f"class {code}")
     if flag & COMPLEX:
         kind = f"complex {kind}"
-    told = name.decode("ascii", "backslashreplace")
+    shown = name.decode("ascii", "backslashreplace")
     if code not in NUMERIC:
-        return _Variable(told, shape, kind, 0, b"")
+        return _Variable(shown, shape, kind, 0, b"")
     stored, numbers, _ = _element(content, at, order)
-    return _Variable(told, shape, kind, stored, numbers)
+    return _Variable(shown, shape, kind, stored, numbers)
 
 
 def _vector(path: Path, variable: _Variable, order: str) -> NDArray[np.float64]:
@@ -167,8 +167,8 @@ def _vector(path: Path, variable: _Variable, order: str) -> NDArray[np.float64]:
         raise FormatError(path, None, what)
     code = STORED.get(stored)
     if code is None or len(content) != size * np.dtype(code).itemsize:
-        told = f"{name} has {len(content)} bytes of type {stored} for {size} numbers"
-        raise FormatError(path, None, _unreadable(told))
+        shown = f"{name} has {len(content)} bytes of type {stored} for {size} numbers"
+        raise FormatError(path, None, _unreadable(shown))
     with np.errstate(invalid="ignore"):  # a signalling NaN; it is refused below
         vector = np.frombuffer(content, order + code).astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(vector))

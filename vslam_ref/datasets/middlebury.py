@@ -53,8 +53,8 @@ def read_cameras(path: Path) -> Cameras:
     Raises
     ------
     FormatError
-        If the count disagrees, a line has not 22 columns, a word is no finite number, a name is a path or
-        comes twice, K has a skew or no positive focal length, or R is no rotation.
+        If the count disagrees, a line has not 22 columns, a word is not a finite number, a name is a path or
+        comes twice, K has a skew or no positive focal length, or R is not a rotation.
     """
     lines = list(read_lines(path, MAX_BYTES))
     if not lines:
@@ -91,7 +91,7 @@ def _view(path: Path, line: int, text: str) -> tuple[str, Pinhole, Array]:
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(R @ R.T - np.eye(3)).max()
         if not (off <= ORTHONORMAL and np.linalg.det(R) > 0):
-            what = f"R is no rotation: R R^T is off by {off:.3g}, determinant {np.linalg.det(R):.3g}"
+            what = f"R is not a rotation: R R^T is off by {off:.3g}, determinant {np.linalg.det(R):.3g}"
             raise FormatError(path, line, f"{what}; expected 0 and 1")
     camera = Pinhole(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
     return words[0], camera, se3.nearest(se3.from_rt(R, t))

@@ -51,7 +51,7 @@ def read_log(folder: Path, robot: int) -> SlamLog:
     Raises
     ------
     FormatError
-        On anything that is not as the module says, with file and line.
+        Where a file does not have the format above, with file and line.
     """
     here = robots(folder) if folder.is_dir() else []
     if robot not in here:

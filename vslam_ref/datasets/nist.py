@@ -75,7 +75,7 @@ def read_problem(path: Path) -> NistProblem:
     Raises
     ------
     FormatError
-        If a part is missing, a count disagrees, or a number is none, with file and line.
+        If a part is missing, a count disagrees, or a word is not a number, with file and line.
     """
     lines = dict(read_lines(path, MAX_BYTES))
     for at, text in lines.items():

@@ -70,7 +70,7 @@ class Numbers:
             raise self.error(k, f"{name} is {self.values[k]:g}; expected {right}")
 
     def whole(self, at: ArrayLike, name: str, below: int, *, right: str = "") -> IntArray:
-        """Numbers as integers from 0 to ``below`` - 1, or :class:`FormatError` at the first that is none."""
+        """Numbers as integers from 0 to ``below`` - 1, or :class:`FormatError` at the first other one."""
         places = np.asarray(at)
         values = self.values[places]
         right = right or (f"a whole number from 0 to {below - 1}" if below > 0 else "none, there are none")
@@ -106,7 +106,7 @@ def read_numbers(path: Path, data: bytes) -> Numbers:
     Raises
     ------
     FormatError
-        At the first word that is no finite number.
+        At the first word that is not a finite number.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def read_numbers(path: Path, data: bytes) -> Numbers:
     ([1.0, 2.0, 300.0], 2)
     >>> read_numbers(Path("a.txt"), b"1 2\nnan 4")
     Traceback (most recent call last):
-    vslam_ref.datasets.text.FormatError: a.txt:2: 'nan' is no number; expected a finite number
+    vslam_ref.datasets.text.FormatError: a.txt:2: 'nan' is not a number; expected a finite number
     """
     parts: list[Array] = []
     for start, stop in _pieces(data):
@@ -146,12 +146,13 @@ def _pieces(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 def _wrong_word(path: Path, data: bytes, start: int, stop: int) -> FormatError:
-    """The error at the first word of a piece that is no finite number."""
+    """The error at the first word of a piece that is not a finite number."""
     at, what = start, "not a text of numbers; expected digits, blanks and line ends"
     for match in re.finditer(rb"\S+", data[start:stop]):
         if not _is_number(match[0]):
             at, word = start + match.start(), match[0]
-            what = f"{word[:40].decode('ascii', 'backslashreplace')!r} is no number; expected a finite number"
+            shown = word[:40].decode("ascii", "backslashreplace")
+            what = f"{shown!r} is not a number; expected a finite number"
             if len(word) > LONGEST_WORD:
                 what = f"a word of {len(word)} characters; expected a number of at most {LONGEST_WORD}"
             break

@@ -1,4 +1,4 @@
-"""How large a picture is, by its head alone: before anything of that size is made.
+"""How large a picture is, by its head alone: before memory of that size is taken.
 
 A file of a hundred bytes may say that it holds a billion pixels, or a PNG that a part of it has two
 gigabytes; decoders make room for both before they look further.

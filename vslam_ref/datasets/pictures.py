@@ -1,7 +1,7 @@
 """Pictures from files, as grey values.
 
-OpenCV decodes them.  What its decoders would write to the terminal is caught, and told in the error; sizes
-are looked at before anything is unpacked.
+OpenCV decodes them.  What its decoders would write to the terminal is caught, and quoted in the error; sizes
+are read before a picture is unpacked.
 """
 
 from __future__ import annotations
@@ -68,13 +68,13 @@ def read_grey(path: Path | str) -> GreyImage:
     if not path.is_file():
         raise FormatError(path, None, "no such file")
     require_size(path, MAX_PIXELS)
-    with _complaints() as told:
+    with _complaints() as shown:
         try:
             image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
         except cv2.error as error:  # more than 2^30 pixels
             image = None
-            told.append(str(error.err))
-    why = " ".join(" ".join(told).split())
+            shown.append(str(error.err))
+    why = " ".join(" ".join(shown).split())
     if image is None:
         right = f"expected one of {', '.join(SUFFIXES)}"
         raise FormatError(path, None, f"no image that can be read{f' ({why})' if why else ''}; {right}")
@@ -91,15 +91,15 @@ def read_grey(path: Path | str) -> GreyImage:
 @contextmanager
 def _complaints() -> Iterator[list[str]]:
     """Collect what the decoders write to the process's standard error: lines that name no file."""
-    told: list[str] = []
+    shown: list[str] = []
     sys.stderr.flush()
     with tempfile.TemporaryFile() as sink:
         kept = os.dup(2)
         try:
             os.dup2(sink.fileno(), 2)
-            yield told
+            yield shown
         finally:
             os.dup2(kept, 2)
             os.close(kept)
             sink.seek(0)
-            told.append(sink.read(1000).decode("utf-8", "replace"))
+            shown.append(sink.read(1000).decode("utf-8", "replace"))

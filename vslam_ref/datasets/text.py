@@ -130,13 +130,13 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     Raises
     ------
     FormatError
-        As :func:`read_bytes`, and on bytes that are no text.
+        As :func:`read_bytes`, and on bytes that are not text.
     """
     return decoded(path, read_bytes(path, max_bytes))
 
 
 def decoded(path: Path, data: bytes) -> str:
-    """Text of a file's bytes without a byte order mark, or :class:`FormatError` where they are none."""
+    """Text of a file's bytes without a byte order mark, or :class:`FormatError` where they are not UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -203,7 +203,7 @@ def read_columns(path: Path, names: Sequence[str]) -> Columns:
     Raises
     ------
     FormatError
-        On a wrong number of columns, a word that is no finite number, or no row at all.
+        On a wrong number of columns, a word that is not a finite number, or no row at all.
     """
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -229,7 +229,7 @@ def require_order(table: Columns, column: int, *, strict: bool = False) -> None:
 
 
 def require_integers(table: Columns, column: int, name: str) -> IntArray:
-    """Return a column as integers, or raise :class:`FormatError` at the first that is none."""
+    """Return a column as integers, or raise :class:`FormatError` at the first that is not an integer."""
     values = table.values[:, column]
     small = np.abs(values) < LARGEST_INTEGER
     table.require(

@@ -86,7 +86,7 @@ def read_log(folder: Path) -> SlamLog:
     Raises
     ------
     FormatError
-        On anything that is not as the module says, with file and line.
+        Where a file does not have the format above, with file and line.
     """
     path = folder / "aa3_dr.mat"
     raw = matfile.read_vectors(path, ("time", "speed", "steering"))

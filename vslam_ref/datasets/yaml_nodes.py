@@ -127,7 +127,7 @@ def read_yaml(path: Path) -> Node:
     Raises
     ------
     FormatError
-        Where it is none: no file, no text, too long, nested too deeply, or against YAML's grammar.
+        Where it cannot be read: no file, not text, too long, nested too deeply, or against YAML's grammar.
     """
     import yaml
 
@@ -168,10 +168,10 @@ def rigid(node: Node, T: Array) -> Array:
     if T.shape != (4, 4):
         raise node.error(f"{node.name} is {T.shape[0]} x {T.shape[1]}; expected 4 x 4")
     R = T[:3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation either
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not a rotation either
         is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0
     if not is_rotation:
-        raise node.error(f"{node.name} is no rigid motion; expected a rotation in its upper left 3 x 3")
+        raise node.error(f"{node.name} is not a rigid motion; expected a rotation in its upper left 3 x 3")
     if not np.allclose(T[3], [0, 0, 0, 1], atol=1e-9):
         raise node.error(f"last row of {node.name} is {T[3].tolist()}; expected [0, 0, 0, 1]")
     if not (np.abs(T[:3, 3]) < LONGEST).all():

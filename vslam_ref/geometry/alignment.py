@@ -25,8 +25,9 @@ image; among the rotations the least is lost by turning the sign where the singu
 
 **When is R unique?**  A small turn phi in the plane of the singular directions i and j lowers the trace by
 :math:`(D_i S_i + D_j S_j)\,\varphi^2/2`, and the two last directions give the smallest sum.  R is unique
-exactly when this sum is positive.  It vanishes for points on one line (in space: nothing tells a turn about
-the line), for points at one place, and for a mirror image that is as thick in one direction as in another.
+exactly when this sum is positive.  It vanishes for points on one line (in space: a turn about the line
+changes no distance), for points at one place, and for a mirror image that is as thick in one direction as
+in another.
 """
 
 from __future__ import annotations

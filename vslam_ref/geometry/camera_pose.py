@@ -2,7 +2,7 @@
 
 Two ways to write one pose are in use.  ``T_cam_world`` has the translation ``t_cam_world``: the world's
 origin, seen from the camera.  The other has the camera's centre ``p_world``, seen from the world.  They are
-the same numbers only where the rotation is none and the sign is forgotten.
+the same numbers only for the identity, and with the sign left out.
 """
 
 from __future__ import annotations

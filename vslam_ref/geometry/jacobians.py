@@ -29,8 +29,8 @@ class Combined(NamedTuple):
     J_b: Array
 
 
-class Mapped(NamedTuple):
-    """Something made of one element, and its Jacobian (..., k, k)."""
+class Unary(NamedTuple):
+    """A function of one element, and its Jacobian (..., k, k)."""
 
     value: Array
     J_pose: Array

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, as_array, blocks, times
 from vslam_ref.geometry import so2
 from vslam_ref.geometry.coefficients import rotation_coefficients
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
+from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 
 DOF = 3
 
@@ -200,13 +200,13 @@ def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     return combined(between(a, b), -Ad, Ad, axes=1)
 
 
-def inverse_with_jacobians(pose: ArrayLike) -> Mapped:
+def inverse_with_jacobians(pose: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`inverse`: -Ad of T^-1."""
     value = inverse(pose)
-    return Mapped(value, -adjoint(value))
+    return Unary(value, -adjoint(value))
 
 
-def log_with_jacobians(pose: ArrayLike) -> Mapped:
+def log_with_jacobians(pose: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
     xi = log(pose)
-    return Mapped(xi, left_jacobian_inverse(xi))
+    return Unary(xi, left_jacobian_inverse(xi))

@@ -23,7 +23,7 @@ from vslam_ref.geometry.coefficients import (
     rotation_polynomial,
     similarity_coefficients,
 )
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
+from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 from vslam_ref.geometry.nearest import nearest_rotation
 
 # of 4 x 4 matrices: the same functions as for rigid motions
@@ -236,13 +236,13 @@ def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     return combined(between(a, b), -Ad, Ad)
 
 
-def inverse_with_jacobians(S: ArrayLike) -> Mapped:
+def inverse_with_jacobians(S: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`inverse`: -Ad of S^-1."""
     value = inverse(S)
-    return Mapped(value, -adjoint(value))
+    return Unary(value, -adjoint(value))
 
 
-def log_with_jacobians(S: ArrayLike) -> Mapped:
+def log_with_jacobians(S: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
     xi = log(S)
-    return Mapped(xi, left_jacobian_inverse(xi))
+    return Unary(xi, left_jacobian_inverse(xi))

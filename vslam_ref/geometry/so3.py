@@ -21,7 +21,7 @@ from vslam_ref.geometry.coefficients import (
     rotation_coefficients,
     rotation_polynomial,
 )
-from vslam_ref.geometry.jacobians import Acted, Combined, Mapped, combined
+from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 from vslam_ref.geometry.nearest import nearest_rotation
 
 DOF = 3
@@ -175,13 +175,13 @@ def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
     return combined(between(a, b), -inverse(a), inverse(a))
 
 
-def inverse_with_jacobians(R: ArrayLike) -> Mapped:
+def inverse_with_jacobians(R: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`inverse`: -R^-1."""
     value = inverse(R)
-    return Mapped(value, -value)
+    return Unary(value, -value)
 
 
-def log_with_jacobians(R: ArrayLike) -> Mapped:
+def log_with_jacobians(R: ArrayLike) -> Unary:
     """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
     phi = log(R)
-    return Mapped(phi, left_jacobian_inverse(phi))
+    return Unary(phi, left_jacobian_inverse(phi))

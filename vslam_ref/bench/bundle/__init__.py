@@ -9,7 +9,7 @@ BA-3  steps until the cost is within 1e-4 of the best peer's, ours over Ceres'
 BA-4  time of an iteration when a chain of views is doubled; extra memory per observation
 ===== =============================================================================================
 
-Building a problem is timed for nobody.  All solutions are judged by one cost function,
+Building a problem is not timed.  All solutions are judged by one cost function,
 :func:`cost`.  Peers that are not installed are named and left out (``pip install ".[peers]"``).
 """
 
@@ -86,7 +86,7 @@ def run(quick: bool = False) -> dict[str, Any]:
 def cost(problem: BundleProblem, scene: Scene) -> float:
     """Half the sum of squares of a scene: the one function that judges every solver's result.
 
-    A point behind its camera makes it infinite, whatever the solver thought of it.
+    A point behind its camera makes it infinite, whatever the solver made of it.
     """
     seen = problem.seen
     at = projection.pixel_from_world(

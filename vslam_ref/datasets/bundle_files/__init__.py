@@ -12,7 +12,7 @@ module        format                                          in, out  converts
 
 ``by_content`` chooses by the file's first bytes.  Every reader answers with :class:`BundleFile`; every error
 is one line with file, line (of a binary file: what and where), and what is right.  Counts are compared with
-the file's size before anything is made for them, and archives are unpacked up to a limit only.  Points seen
+the file's size before memory is taken for them, and archives are unpacked up to a limit only.  Points seen
 once, cameras without points and points behind cameras are no errors here: the adjustment names them.
 """
 

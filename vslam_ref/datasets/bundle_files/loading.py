@@ -14,7 +14,7 @@ from vslam_ref.geometry import so3
 LARGEST = 2 * 2**30
 """Bytes.  The largest BAL problem, 13682 cameras and 29 million observations, has about 1.7 GB of text."""
 RATIO = 32
-"""Printed measurements shrink 3 to 5 times.  What shrinks more than this is no bundle file."""
+"""Printed measurements shrink 3 to 5 times.  What shrinks more than this is not a bundle file."""
 SMALL = 64 * 2**20
 """Bytes that any archive may unpack to: text full of zeros shrinks a thousand times."""
 FARTHEST = 1e15
@@ -49,7 +49,7 @@ def load(path: Path, max_bytes: int | None = None) -> bytes:
 
 
 def require_room(path: Path, line: int | None, counts: str, needed: int, size: int) -> None:
-    """Refuse counts that cannot fit the file, before anything of their size is made.
+    """Refuse counts that cannot fit the file, before memory of their size is taken.
 
     Parameters
     ----------
@@ -112,5 +112,5 @@ def rotations(path: Path, R: Array, line: Callable[[int], int | None], what: str
         with np.errstate(over="ignore", invalid="ignore"):
             determinant = np.linalg.det(R[k])
         found = f"R^T R is off by {off[k]:.3g}, determinant {determinant:.3g}; expected 0 and 1"
-        raise FormatError(path, line(k), f"R of {what} {k} is no rotation: {found}")
+        raise FormatError(path, line(k), f"R of {what} {k} is not a rotation: {found}")
     return np.asarray(so3.nearest(R)) if len(R) else R

@@ -23,7 +23,7 @@ VERTEX = np.dtype([("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("gr
 EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
 NAMES = {"<f8": "double", "|u1": "uchar", "<i4": "int"}
 POINT_COLOUR, CAMERA_COLOUR = (200, 200, 200), (213, 94, 0)
-"""Light grey; vermilion, which the colour-blind tell from the other colours."""
+"""Light grey; vermilion, which differs from the other colours for colour-blind readers too."""
 PYRAMID = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
 DEPTH_SHARE = 0.02
 """Depth of the pyramids as a share of the typical distance from a camera to the middle of the points."""

@@ -12,7 +12,7 @@ euroc    ``time,tx,ty,tz,qw,qx,qy,qz``: **nanoseconds** (whole), metres, quatern
 All three are read as ``T_world_body``.  ``#`` begins a comment, ``.gz`` is unpacked.
 
 *Nothing is lost.*  Numbers are written with the fewest digits that read back as the same double.  Two
-things of a file are no part of a :class:`~vslam_ref.metrics.trajectory.poses.Trajectory`: quaternions as
+things of a file are not part of a :class:`~vslam_ref.metrics.trajectory.poses.Trajectory`: quaternions as
 they stand there (rounded, so not of unit length; the rotation matrices are those of the normalised
 quaternions), and whole nanoseconds (a double holds seconds since 1970 to 2.4e-7 s).  :class:`AsRead` keeps
 them, and :func:`write` gives them back.

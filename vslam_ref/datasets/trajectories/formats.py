@@ -56,7 +56,7 @@ class TrajectoryFile(NamedTuple):
 
 
 def seconds(ns: IntArray) -> Array:
-    """Seconds of whole nanoseconds, shape (N,), whole seconds and the rest apart: 1e18 ns are no double."""
+    """Seconds of nanoseconds, shape (N,); whole seconds apart, as 1e18 ns do not fit a double."""
     return np.asarray(ns // 10**9 + ns % 10**9 / 1e9)
 
 

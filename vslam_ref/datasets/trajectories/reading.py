@@ -37,12 +37,12 @@ def read(path: Path, format: str | None = None) -> TrajectoryFile:
     path : Path
         Plain text or ``.gz``.
     format : {"tum", "kitti", "euroc"}, optional
-        By default told from the first line: commas are EuRoC, 8 columns TUM, 12 KITTI.
+        By default found from the first line: commas are EuRoC, 8 columns TUM, 12 KITTI.
 
     Raises
     ------
     FormatError
-        On anything that is not as the module says, with file and line.
+        Where a file does not have the format above, with file and line.
     ValueError
         If there is no such format.
     """
@@ -53,7 +53,7 @@ def read(path: Path, format: str | None = None) -> TrajectoryFile:
 
 
 def detect(path: Path) -> str:
-    """Tell the format from the first line that is no comment.
+    """Find the format from the first line that is not a comment.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def read_kitti(path: Path) -> TrajectoryFile:
     """Read twelve numbers a line; see :func:`read`.  The matrices stay as they stand there."""
     table = read_columns(path, KITTI)
     R = table.values.reshape(-1, 3, 4)[:, :, :3].copy()
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no rotation either
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not a rotation either
         off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max((1, 2))
         off[np.linalg.det(R) < 0] = 2.0  # a mirror
     table.require(

@@ -16,7 +16,7 @@ def first_positive_root(coefficients: ArrayLike) -> float:
     """Smallest positive real root of c0 + c1 x + c2 x^2 + ..., or infinity.
 
     A pair of roots within 1e-6 of the real axis counts as a double root: there the polynomial touches
-    zero as far as its rounded coefficients can tell.
+    zero to the rounding of its coefficients.
 
     Examples
     --------

@@ -60,7 +60,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
     Raises
     ------
     ValueError
-        On a wrong shape, or an omega that is no such angle.
+        On a wrong shape, or an omega outside this range.
 
     Examples
     --------
