@@ -156,24 +156,24 @@ def tangent_matrix(source: str, target: str, adjoint: ArrayLike, *, of_inverse: 
 
 
 def convert_covariance(cov: ArrayLike, M: ArrayLike) -> Array:
-    """Covariance in the target's tangent vectors: M cov M^T, shapes (..., n, n)."""
+    """Covariance in the target's tangent vectors and units: M cov M^T, shapes (..., n, n)."""
     M = as_array("M", M)
     return np.asarray(M @ as_array("cov", cov) @ transpose(M))
 
 
 def convert_information(information: ArrayLike, M: ArrayLike) -> Array:
-    """Information matrix (inverse covariance) in the target's tangent vectors: M^-T L M^-1."""
+    """Information matrix (inverse covariance) in the target's vectors and units: M^-T L M^-1, (..., n, n)."""
     back = _inverse(as_array("M", M))
     return np.asarray(transpose(back) @ as_array("information", information) @ back)
 
 
 def convert_jacobian(J: ArrayLike, M: ArrayLike) -> Array:
-    """Jacobian (..., m, n) whose columns are the target's tangent directions: J M^-1."""
+    """Jacobian (..., m, n) whose columns are the target's tangent directions and units: J M^-1."""
     return np.asarray(as_array("J", J) @ _inverse(as_array("M", M)))
 
 
 def similarity_from_gtsam(M: ArrayLike) -> Array:
-    """Our matrix [[s R, t], [0, 1]] from GTSAM's [[R, t'], [0, 1/s]], shape (..., 4, 4).
+    """Our matrix [[s R, t], [0, 1]] from GTSAM's [[R, t'], [0, 1/s]], shape (..., 4, 4), metres.
 
     Both map points alike once the last coordinate is divided out, X -> s (R X + t'): so t = s t'.
     """
@@ -182,7 +182,7 @@ def similarity_from_gtsam(M: ArrayLike) -> Array:
 
 
 def similarity_to_gtsam(S: ArrayLike) -> Array:
-    """GTSAM's matrix [[R, t'], [0, 1/s]] from ours, shape (..., 4, 4)."""
+    """GTSAM's matrix [[R, t'], [0, 1/s]] from ours, shape (..., 4, 4), metres."""
     S = np.asarray(S, dtype=np.float64)
     s = np.linalg.norm(S[..., :3, :3], axis=(-2, -1)) / np.sqrt(3.0)
     return np.asarray(S / s[..., None, None])
@@ -225,7 +225,7 @@ def quaternion_to_wxyz(q: ArrayLike, order: str, *, product: str = "hamilton") -
 
 
 def quaternion_from_wxyz(q: ArrayLike, order: str, *, product: str = "hamilton") -> Array:
-    """Undo :func:`quaternion_to_wxyz`, same arguments."""
+    """Undo :func:`quaternion_to_wxyz`, shape (..., 4), same arguments."""
     ours = quaternion_to_wxyz(q, "wxyz", product=product)  # conjugation is its own inverse
     quaternion_to_wxyz(ours, order)  # only to check the order's name
     return np.roll(ours, -1, axis=-1) if order == "xyzw" else ours

@@ -85,7 +85,7 @@ class Alignment:
         return not self.reason
 
     def act(self, points: ArrayLike) -> Array:
-        """Map points (..., d) of the source frame into the target frame."""
+        """Map points (..., d) of the source frame into the target frame and its unit."""
         x = np.asarray(points, dtype=np.float64)
         moved: Array = self.scale * x @ self.R_target_source.T + self.t_target_source
         return moved
@@ -101,7 +101,7 @@ def align(
     Parameters
     ----------
     source, target : array_like, shape (N, d)
-        Pairs of points, d = 2 or 3, N >= 1.
+        Pairs of points, d = 2 or 3, N >= 1; each set in a unit of its own, usually metres.
     with_scale : bool
         Whether the scale is free (similarity) or 1 (rigid motion).
     weights : array_like, shape (N,), optional

@@ -48,7 +48,7 @@ def camera_from_world(R_cam_world: ArrayLike, p_world: ArrayLike, X_world: Array
 
 
 def pose_from_centre(R_cam_world: ArrayLike, p_world: ArrayLike) -> Array:
-    """``T_cam_world (..., 4, 4)`` from rotation (..., 3, 3) and centre (..., 3): t = -R p.
+    """``T_cam_world (..., 4, 4)`` from rotation (..., 3, 3) and centre (..., 3), metres: t = -R p.
 
     Implements :eq:`eq-centre`.
     """
@@ -57,7 +57,7 @@ def pose_from_centre(R_cam_world: ArrayLike, p_world: ArrayLike) -> Array:
 
 
 def centre_from_pose(T_cam_world: ArrayLike) -> Array:
-    """Camera centre in the world, shape (..., 4, 4) -> (..., 3): p = -R^T t, the translation of T_world_cam.
+    """Camera centre in the world, metres, shape (..., 4, 4) -> (..., 3): p = -R^T t, as in T_world_cam.
 
     >>> import numpy as np
     >>> centre_from_pose(pose_from_centre(np.eye(3), [1.0, 2.0, 3.0])).tolist()

@@ -54,7 +54,7 @@ def rotation_coefficients(theta2: Array) -> Array:
 
 
 def expm1_over(x: Array) -> Array:
-    """(e^x - 1) / x, equal to 1 at 0."""
+    """(e^x - 1) / x, equal to 1 at 0; shape (...), no unit."""
     zero = x == 0.0
     return np.where(zero, 1.0, np.expm1(x) / np.where(zero, 1.0, x))
 
@@ -109,7 +109,7 @@ def _power_sums(sigma: Array, theta2: Array) -> tuple[Array, Array]:
 
 
 def inverse_coefficients(A: Array, B: Array, C: Array, theta2: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of (A I + B Phi + C Phi^2)^-1 in the same basis.
+    """Coefficients of (A I + B Phi + C Phi^2)^-1 in the same basis, all of shape (...); theta2 in rad^2.
 
     The matrix has the eigenvalues A and A - theta^2 C +- i theta B; D is the squared length of the latter.
     """

@@ -2,7 +2,8 @@
 
 ``q = (cos(theta/2), sin(theta/2) a)`` turns by theta about the unit axis a.  q and -q are the same
 rotation.  Products read as those of the matrices, ``matrix(compose(a, b)) = matrix(a) @ matrix(b)``.  Batch
-axes come first.
+axes come first.  Quaternions have no unit, rotation vectors are in radians; arrays of other shapes raise
+ValueError.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ def normalise(q: ArrayLike) -> Array:
     # of very large or small numbers the squares would leave the range
     size = np.abs(q).max(-1, keepdims=True)
     if not np.all((size > 0.0) & np.isfinite(size)):
-        raise ValueError("a quaternion is zero or not finite: it stands for no rotation")
+        raise ValueError("a quaternion is zero or not finite: it is not a rotation")
     scaled = q / size
     return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
 def canonical(q: ArrayLike) -> Array:
-    """Of q and -q the one with w > 0; where w = 0, with the first other number that is not 0 positive."""
+    """Of q and -q (..., 4) the one with w > 0; where w = 0, with the first other nonzero number positive."""
     q = as_array("q", q, 4)
     first = np.argmax(q != 0.0, axis=-1)[..., None]
     return np.where(np.take_along_axis(q, first, -1) < 0.0, -q, q)
@@ -107,14 +108,17 @@ def from_matrix(R: ArrayLike) -> Array:
 
 
 def exp(phi: ArrayLike) -> Array:
-    """Unit quaternion of a rotation vector, shape (..., 3) -> (..., 4): (cos(theta/2), sin(theta/2) a)."""
+    """Unit quaternion of a rotation vector, radians, shape (..., 3) -> (..., 4).
+
+    (cos(theta/2), sin(theta/2) a) for the angle theta about the unit axis a.
+    """
     half = as_array("phi", phi, 3) / 2.0
     c = rotation_coefficients(np.sum(half * half, -1))
     return np.concatenate([c[0][..., None], c[1][..., None] * half], -1)
 
 
 def log(q: ArrayLike) -> Array:
-    """Rotation vector of length 0 to pi, shape (..., 4) -> (..., 3).
+    """Rotation vector of length 0 to pi, radians, shape (..., 4) -> (..., 3).
 
     2 atan2(|v|, w) is well conditioned at every angle, and does not mind a length that is not quite 1.  At
     half a turn both ends of the axis are right; :func:`canonical` says which one is returned.

@@ -7,7 +7,7 @@ r"""SE(3), the rigid motions of space, as matrices ``T (..., 4, 4)``.
 
 A tangent vector is ``xi = (rho, phi) (..., 6)``, translation first: metres, then radians.  Perturbations
 act from the left, ``T <- Exp(xi) T``, so xi is written in the frame a of ``T_a_b``.  Accuracy as in
-:mod:`.so3`; a translation is exact relative to the length of rho.
+:mod:`.so3`; a translation is exact relative to the length of rho.  Arrays of other shapes raise ValueError.
 """
 
 from __future__ import annotations
@@ -24,12 +24,18 @@ DOF = 6
 
 
 def identity(shape: tuple[int, ...] = ()) -> Array:
-    """Identity motions, shape (*shape, 4, 4)."""
+    """Identity motions, shape (*shape, 4, 4).
+
+    Translations, in metres, are zero.
+    """
     return np.broadcast_to(np.eye(4), (*shape, 4, 4)).copy()
 
 
 def from_rt(R: ArrayLike, t: ArrayLike) -> Array:
-    """Motion with rotation ``R (..., 3, 3)`` and translation ``t (..., 3)``, shape (..., 4, 4)."""
+    """Motion with rotation ``R (..., 3, 3)`` and translation ``t (..., 3)``, shape (..., 4, 4).
+
+    ``t`` in metres: T_a_b from R_a_b and t_a_b.
+    """
     R, t = as_array("R", R, 3, 3), as_array("t", t, 3)
     T = np.zeros((*np.broadcast_shapes(R.shape[:-2], t.shape[:-1]), 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
@@ -37,22 +43,34 @@ def from_rt(R: ArrayLike, t: ArrayLike) -> Array:
 
 
 def rotation(T: ArrayLike) -> Array:
-    """R_a_b of T_a_b, shape (..., 4, 4) -> (..., 3, 3)."""
+    """R_a_b of T_a_b, shape (..., 4, 4) -> (..., 3, 3).
+
+    A rotation has no unit.
+    """
     return as_array("T", T, 4, 4)[..., :3, :3]
 
 
 def translation(T: ArrayLike) -> Array:
-    """t_a_b of T_a_b: where b's origin is, seen from a; shape (..., 4, 4) -> (..., 3)."""
+    """t_a_b of T_a_b: where b's origin is, seen from a; shape (..., 4, 4) -> (..., 3).
+
+    In metres, in the frame a.
+    """
     return as_array("T", T, 4, 4)[..., :3, 3]
 
 
 def matrix(T: ArrayLike) -> Array:
-    """The element as a matrix: itself, shape (..., 4, 4)."""
+    """The element as a matrix: itself, shape (..., 4, 4).
+
+    Its last column in metres.
+    """
     return as_array("T", T, 4, 4)
 
 
 def hat(xi: ArrayLike) -> Array:
-    """Generator [[hat(phi), rho], [0, 0]] of Exp(xi), shape (..., 6) -> (..., 4, 4)."""
+    """Generator [[hat(phi), rho], [0, 0]] of Exp(xi), shape (..., 6) -> (..., 4, 4).
+
+    The tangent vector is xi = (rho, phi) in metres and radians.
+    """
     xi = as_array("xi", xi, 6)
     M = np.zeros((*xi.shape[:-1], 4, 4))
     M[..., :3, :3], M[..., :3, 3] = so3.hat(xi[..., 3:]), xi[..., :3]
@@ -60,7 +78,10 @@ def hat(xi: ArrayLike) -> Array:
 
 
 def vee(M: ArrayLike) -> Array:
-    """Undo :func:`hat`, shape (..., 4, 4) -> (..., 6)."""
+    """Undo :func:`hat`, shape (..., 4, 4) -> (..., 6).
+
+    Returns xi = (rho, phi) in metres and radians.
+    """
     M = as_array("M", M, 4, 4)
     return np.concatenate([M[..., :3, 3], so3.vee(M[..., :3, :3])], -1)
 
@@ -80,6 +101,8 @@ def exp(xi: ArrayLike) -> Array:
 def log(T: ArrayLike) -> Array:
     """Tangent vector with Exp(xi) = T and an angle in [0, pi], shape (..., 4, 4) -> (..., 6).
 
+    Returns xi = (rho, phi) in metres and radians.
+
     Implements :eq:`eq-log-rigid`.
     """
     T = as_array("T", T, 4, 4)
@@ -88,23 +111,34 @@ def log(T: ArrayLike) -> Array:
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product T_a T_b, shapes (..., 4, 4)."""
+    """Product T_a T_b, shapes (..., 4, 4).
+
+    Elements T_a_b and T_b_c give T_a_c.  Translations in metres.
+    """
     return np.asarray(as_array("a", a, 4, 4) @ as_array("b", b, 4, 4))
 
 
 def inverse(T: ArrayLike) -> Array:
-    """T^-1 = [[R^T, -R^T t], [0, 1]], shape (..., 4, 4)."""
+    """T^-1 = [[R^T, -R^T t], [0, 1]], shape (..., 4, 4).
+
+    An element T_a_b gives T_b_a.  Translations in metres.
+    """
     R_back = transpose(rotation(T))
     return from_rt(R_back, -times(R_back, translation(T)))
 
 
 def between(a: ArrayLike, b: ArrayLike) -> Array:
-    """T_a^-1 T_b, shapes (..., 4, 4)."""
+    """T_a^-1 T_b, shapes (..., 4, 4).
+
+    Elements T_w_a and T_w_b give T_a_b.  Translations in metres.
+    """
     return compose(inverse(a), b)
 
 
 def act(T: ArrayLike, x: ArrayLike) -> Array:
     """Coordinates in a of points ``x (..., 3)`` in b, by ``T_a_b (..., 4, 4)``: R x + t.
+
+    Points and result in metres.
 
     Implements :eq:`eq-a2-1` (A2.1): the report's E_KW is ``T_kf_world``, its p_W the world point.
 
@@ -115,7 +149,10 @@ def act(T: ArrayLike, x: ArrayLike) -> Array:
 
 
 def ad(xi: ArrayLike) -> Array:
-    """Matrix of the Lie bracket, [[hat(phi), hat(rho)], [0, hat(phi)]], shape (..., 6) -> (..., 6, 6)."""
+    """Matrix of the Lie bracket, [[hat(phi), hat(rho)], [0, hat(phi)]], shape (..., 6) -> (..., 6, 6).
+
+    The tangent vector is xi = (rho, phi) in metres and radians; shape of the result (..., 6, 6).
+    """
     xi = as_array("xi", xi, 6)
     Phi = so3.hat(xi[..., 3:])
     return blocks([[Phi, so3.hat(xi[..., :3])], [0.0, Phi]])
@@ -123,6 +160,8 @@ def ad(xi: ArrayLike) -> Array:
 
 def adjoint(T: ArrayLike) -> Array:
     """Matrix with T Exp(xi) T^-1 = Exp(Ad xi), shape (..., 4, 4) -> (..., 6, 6).
+
+    Maps xi = (rho, phi) in metres and radians at b to the same at a.
 
     Implements :eq:`eq-adjoint-rigid`: [[R, hat(t) R], [0, R]].
     """
@@ -133,6 +172,8 @@ def adjoint(T: ArrayLike) -> Array:
 def left_jacobian(xi: ArrayLike) -> Array:
     """J with Exp(xi + d) = Exp(J d) Exp(xi) to first order, shape (..., 6) -> (..., 6, 6).
 
+    The tangent vector is xi = (rho, phi) in metres and radians.
+
     Implements :eq:`eq-jacobian-rigid`: [[V, Q], [0, V]].
     """
     xi = as_array("xi", xi, 6)
@@ -142,6 +183,8 @@ def left_jacobian(xi: ArrayLike) -> Array:
 
 def q_matrix(xi: ArrayLike) -> Array:
     """Upper right block of the left Jacobian, shape (..., 6) -> (..., 3, 3).
+
+    The tangent vector is xi = (rho, phi) in metres and radians; the result in metres.
 
     Implements :eq:`eq-q-matrix`: the derivative of V(phi) when phi moves along rho, which is
     c_2 P + c_3 (Phi P + P Phi) + (phi . rho) ((2 c_4 - c_3) Phi + (3 c_5 - c_4) Phi^2).
@@ -156,7 +199,10 @@ def q_matrix(xi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(xi: ArrayLike) -> Array:
-    """Inverse of :func:`left_jacobian`: [[V^-1, -V^-1 Q V^-1], [0, V^-1]]; for angles below 2 pi."""
+    """Inverse of :func:`left_jacobian`: [[V^-1, -V^-1 Q V^-1], [0, V^-1]]; for angles below 2 pi.
+
+    The tangent vector is xi = (rho, phi) in metres and radians; shape of the result (..., 6, 6).
+    """
     xi = as_array("xi", xi, 6)
     V_inv = so3.left_jacobian_inverse(xi[..., 3:])
     return blocks([[V_inv, -V_inv @ q_matrix(xi) @ V_inv], [0.0, V_inv]])
@@ -165,13 +211,19 @@ def left_jacobian_inverse(xi: ArrayLike) -> Array:
 def perturb(T: ArrayLike, xi: ArrayLike) -> Array:
     """Exp(xi) T, shapes (..., 4, 4) and (..., 6).
 
+    The tangent vector is xi = (rho, phi) in metres and radians, in the frame a of T_a_b.
+
     Implements :eq:`eq-a2-5` (A2.5): E_{t+1} = exp(mu) E_t, from one frame to the next.
     """
     return compose(exp(xi), T)
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Constant velocity (a screw) from a (fraction 0) to b (1); shapes (..., 4, 4), (...)."""
+    """Constant velocity (a screw) from a (fraction 0) to b (1); shapes (..., 4, 4), (...).
+
+    Elements and result ``(..., 4, 4)`` map to the same frame; ``fraction (...)`` has no unit.  Translations
+    in metres.
+    """
     fraction = np.asarray(fraction, dtype=np.float64)[..., None]
     return compose(a, exp(fraction * log(between(a, b))))
 
@@ -188,6 +240,8 @@ def random(rng: np.random.Generator, shape: tuple[int, ...] = (), *, spread: flo
 def nearest(M: ArrayLike) -> Array:
     """Rigid motion nearest to a matrix ``(..., 4, 4)`` whose last row is ignored.
 
+    The last column in metres.
+
     In the Frobenius norm rotation and translation do not meet: the rotation is the nearest one, the
     translation stays.  ValueError where :func:`.so3.nearest` is undefined.
     """
@@ -198,6 +252,9 @@ def nearest(M: ArrayLike) -> Array:
 def act_with_jacobians(T: ArrayLike, x: ArrayLike) -> Acted:
     """Value and Jacobians of :func:`act`: J_pose = [I, -hat(T x)] (..., 3, 6), J_point = R.
 
+    ``value (..., 3)`` in the points' unit; J_pose is in a left perturbation, xi = (rho, phi) in metres and
+    radians.
+
     Implements :eq:`eq-act-jacobian`.
     """
     value = act(T, x)
@@ -206,23 +263,39 @@ def act_with_jacobians(T: ArrayLike, x: ArrayLike) -> Acted:
 
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`compose`: I in a; Ad_a in b, as Exp(d) goes through a as Exp(Ad_a d)."""
+    """Value and Jacobians of :func:`compose`: I in a; Ad_a in b, as Exp(d) goes through a as Exp(Ad_a d).
+
+    Elements ``(..., 4, 4)``; J_a and J_b ``(..., 6, 6)`` are in left perturbations, xi = (rho, phi) in
+    metres and radians.
+    """
     return combined(compose(a, b), np.eye(DOF), adjoint(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`between`: -Ad of T_a^-1 in a, Ad of T_a^-1 in b."""
+    """Value and Jacobians of :func:`between`: -Ad of T_a^-1 in a, Ad of T_a^-1 in b.
+
+    Elements ``(..., 4, 4)``; J_a and J_b ``(..., 6, 6)`` are in left perturbations, xi = (rho, phi) in
+    metres and radians.
+    """
     Ad = adjoint(inverse(a))
     return combined(between(a, b), -Ad, Ad)
 
 
 def inverse_with_jacobians(T: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`inverse`: -Ad of T^-1."""
+    """Value and Jacobian of :func:`inverse`: -Ad of T^-1.
+
+    Elements ``(..., 4, 4)``; J_pose ``(..., 6, 6)`` is in a left perturbation, xi = (rho, phi) in metres
+    and radians.
+    """
     value = inverse(T)
     return Unary(value, -adjoint(value))
 
 
 def log_with_jacobians(T: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
+    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there.
+
+    An element ``(..., 4, 4)``; J_pose ``(..., 6, 6)`` is in a left perturbation, xi = (rho, phi) in metres
+    and radians.
+    """
     xi = log(T)
     return Unary(xi, left_jacobian_inverse(xi))

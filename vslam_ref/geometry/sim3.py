@@ -8,7 +8,8 @@ r"""Sim(3), rigid motions with a change of scale, as matrices ``S (..., 4, 4)``.
 The scale multiplies the rotation; the translation is not scaled by it.  (Another layout in use keeps R
 and writes 1/s into the corner: there X_a = s (R X_b + t).)  A tangent vector is ``xi = (rho, phi, sigma)
 (..., 7)``: metres, radians, and the log-scale, s = exp(sigma).  Perturbations act from the left.  Accuracy
-as in :mod:`.so3`, for :math:`|\sigma| \le 8` where a Jacobian is asked for.
+as in :mod:`.so3`, for :math:`|\sigma| \le 8` where a Jacobian is asked for.  Arrays of other shapes raise
+ValueError.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ _TERMS = 14  # the first one left out is below 0.65^15 / 16! < 1e-16
 def from_srt(s: ArrayLike, R: ArrayLike, t: ArrayLike) -> Array:
     """Similarity of scale ``s (...)``, rotation ``R (..., 3, 3)``, translation ``t (..., 3)``.
 
+    ``t`` in metres: S_a_b from s, R_a_b and t_a_b; the scale has no unit.
+
     Raises
     ------
     ValueError
@@ -56,19 +59,28 @@ def from_srt(s: ArrayLike, R: ArrayLike, t: ArrayLike) -> Array:
 
 
 def scale(S: ArrayLike) -> Array:
-    """s, the length of s R over that of R, shape (..., 4, 4) -> (...)."""
+    """s, the length of s R over that of R, shape (..., 4, 4) -> (...).
+
+    A scale has no unit.
+    """
     M = as_array("S", S, 4, 4)[..., :3, :3]
     return np.asarray(np.linalg.norm(M, axis=(-2, -1)) / np.sqrt(3.0))
 
 
 def rotation(S: ArrayLike) -> Array:
-    """R_a_b of S_a_b, shape (..., 4, 4) -> (..., 3, 3)."""
+    """R_a_b of S_a_b, shape (..., 4, 4) -> (..., 3, 3).
+
+    A rotation has no unit.
+    """
     S = as_array("S", S, 4, 4)
     return np.asarray(S[..., :3, :3] / scale(S)[..., None, None])
 
 
 def hat(xi: ArrayLike) -> Array:
-    """Generator [[sigma I + hat(phi), rho], [0, 0]] of Exp(xi), shape (..., 7) -> (..., 4, 4)."""
+    """Generator [[sigma I + hat(phi), rho], [0, 0]] of Exp(xi), shape (..., 7) -> (..., 4, 4).
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale.
+    """
     xi = as_array("xi", xi, 7)
     M = np.zeros((*xi.shape[:-1], 4, 4))
     M[..., :3, :3] = so3.hat(xi[..., 3:6]) + xi[..., 6, None, None] * np.eye(3)
@@ -77,7 +89,10 @@ def hat(xi: ArrayLike) -> Array:
 
 
 def vee(M: ArrayLike) -> Array:
-    """Undo :func:`hat`, shape (..., 4, 4) -> (..., 7)."""
+    """Undo :func:`hat`, shape (..., 4, 4) -> (..., 7).
+
+    Returns xi = (rho, phi, sigma): metres, radians, log-scale.
+    """
     M = as_array("M", M, 4, 4)
     sigma = np.trace(M[..., :3, :3], axis1=-2, axis2=-1) / 3.0
     return np.concatenate([M[..., :3, 3], so3.vee(M[..., :3, :3]), sigma[..., None]], -1)
@@ -85,6 +100,8 @@ def vee(M: ArrayLike) -> Array:
 
 def w_matrix(phi: ArrayLike, sigma: ArrayLike) -> Array:
     """W(phi, sigma) with t = W rho in Exp, shapes (..., 3) and (...) -> (..., 3, 3).
+
+    ``phi`` in radians, ``sigma`` the log-scale; the result has no unit.
 
     Implements :eq:`eq-w-matrix`; the coefficients and their four regimes (phi and sigma, small or not) are
     those of :func:`.similarity_coefficients`.  W(phi, 0) is V of SO(3); W(0, sigma) = (exp(sigma) - 1) /
@@ -95,7 +112,10 @@ def w_matrix(phi: ArrayLike, sigma: ArrayLike) -> Array:
 
 
 def w_matrix_inverse(phi: ArrayLike, sigma: ArrayLike) -> Array:
-    """Inverse of :func:`w_matrix`; it exists unless sigma = 0 and the angle is a multiple of 2 pi."""
+    """Inverse of :func:`w_matrix`; it exists unless sigma = 0 and the angle is a multiple of 2 pi.
+
+    Shapes (..., 3) and (...) -> (..., 3, 3); ``phi`` in radians, ``sigma`` the log-scale.
+    """
     phi, sigma = as_array("phi", phi, 3), np.asarray(sigma, dtype=np.float64)
     theta2 = np.sum(phi * phi, -1)
     coefficients = inverse_coefficients(*similarity_coefficients(sigma, theta2), theta2)
@@ -104,6 +124,8 @@ def w_matrix_inverse(phi: ArrayLike, sigma: ArrayLike) -> Array:
 
 def exp(xi: ArrayLike) -> Array:
     """Similarity [[exp(sigma) Exp(phi), W rho], [0, 1]], shape (..., 7) -> (..., 4, 4).
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale.
 
     Implements :eq:`eq-exp-similarity`.
 
@@ -116,25 +138,36 @@ def exp(xi: ArrayLike) -> Array:
 
 
 def log(S: ArrayLike) -> Array:
-    """Tangent vector with Exp(xi) = S and an angle in [0, pi], shape (..., 4, 4) -> (..., 7)."""
+    """Tangent vector with Exp(xi) = S and an angle in [0, pi], shape (..., 4, 4) -> (..., 7).
+
+    Returns xi = (rho, phi, sigma): metres, radians, log-scale.
+    """
     phi, sigma = so3.log(rotation(S)), np.log(scale(S))
     rho = times(w_matrix_inverse(phi, sigma), translation(S))
     return np.concatenate([rho, phi, sigma[..., None]], -1)
 
 
 def inverse(S: ArrayLike) -> Array:
-    """S^-1: scale 1/s, rotation R^T, translation -R^T t / s; shape (..., 4, 4)."""
+    """S^-1: scale 1/s, rotation R^T, translation -R^T t / s; shape (..., 4, 4).
+
+    An element T_a_b gives T_b_a.  Translations in metres.
+    """
     s, R_back = scale(S), transpose(rotation(S))
     return from_srt(1.0 / s, R_back, -times(R_back, translation(S)) / s[..., None])
 
 
 def between(a: ArrayLike, b: ArrayLike) -> Array:
-    """S_a^-1 S_b, shapes (..., 4, 4)."""
+    """S_a^-1 S_b, shapes (..., 4, 4).
+
+    Elements T_w_a and T_w_b give T_a_b.  Translations in metres.
+    """
     return compose(inverse(a), b)
 
 
 def ad(xi: ArrayLike) -> Array:
     """Matrix of the Lie bracket, shape (..., 7) -> (..., 7, 7).
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale; shape of the result (..., 7, 7).
 
     [[sigma I + hat(phi), hat(rho), -rho], [0, hat(phi), 0], [0, 0, 0]].
     """
@@ -147,6 +180,8 @@ def ad(xi: ArrayLike) -> Array:
 def adjoint(S: ArrayLike) -> Array:
     """Matrix with S Exp(xi) S^-1 = Exp(Ad xi), shape (..., 4, 4) -> (..., 7, 7).
 
+    Maps xi = (rho, phi, sigma): metres, radians, log-scale at b to the same at a.
+
     Implements :eq:`eq-adjoint-similarity`: [[s R, hat(t) R, -t], [0, R, 0], [0, 0, 1]].
     """
     S = as_array("S", S, 4, 4)
@@ -157,6 +192,8 @@ def adjoint(S: ArrayLike) -> Array:
 
 def left_jacobian(xi: ArrayLike) -> Array:
     """J with Exp(xi + d) = Exp(J d) Exp(xi) to first order, shape (..., 7) -> (..., 7, 7).
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale.
 
     Implements :eq:`eq-jacobian-halving`: J(2 x) = (I + Ad_Exp(x)) J(x) / 2 takes the sum of ad^n / (n + 1)!
     from a small x, where it needs few terms, to xi.  No case is special: neither phi = 0 nor sigma = 0 is
@@ -175,7 +212,10 @@ def left_jacobian(xi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(xi: ArrayLike) -> Array:
-    """Inverse of :func:`left_jacobian`, shape (..., 7, 7): block by block, as J is block triangular."""
+    """Inverse of :func:`left_jacobian`, shape (..., 7, 7): block by block, as J is block triangular.
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale; shape of the result (..., 7, 7).
+    """
     xi = as_array("xi", xi, 7)
     phi, sigma = xi[..., 3:6], xi[..., 6]
     J = left_jacobian(xi)
@@ -185,12 +225,19 @@ def left_jacobian_inverse(xi: ArrayLike) -> Array:
 
 
 def perturb(S: ArrayLike, xi: ArrayLike) -> Array:
-    """Exp(xi) S, shapes (..., 4, 4) and (..., 7)."""
+    """Exp(xi) S, shapes (..., 4, 4) and (..., 7).
+
+    The tangent vector is xi = (rho, phi, sigma): metres, radians, log-scale, in the frame a of T_a_b.
+    """
     return compose(exp(xi), S)
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Constant velocity from a (fraction 0) to b (1), the short way round; shapes (..., 4, 4), (...)."""
+    """Constant velocity from a (fraction 0) to b (1), the short way round; shapes (..., 4, 4), (...).
+
+    Elements and result ``(..., 4, 4)`` map to the same frame; ``fraction (...)`` has no unit.  Translations
+    in metres.
+    """
     fraction = np.asarray(fraction, dtype=np.float64)[..., None]
     return compose(a, exp(fraction * log(between(a, b))))
 
@@ -210,6 +257,8 @@ def random(
 def nearest(M: ArrayLike) -> Array:
     """Similarity nearest to a matrix ``(..., 4, 4)`` whose last row is ignored.
 
+    The last column in metres.
+
     The rotation is the one nearest to the 3 x 3 block B, whatever the scale; then |s R - B| is least for
     s = tr(R^T B) / 3.  ValueError where :func:`.so3.nearest` is undefined.
     """
@@ -219,30 +268,50 @@ def nearest(M: ArrayLike) -> Array:
 
 
 def act_with_jacobians(S: ArrayLike, x: ArrayLike) -> Acted:
-    """Value and Jacobians of :func:`act`: J_pose = [I, -hat(S x), S x] (..., 3, 7), J_point = s R."""
+    """Value and Jacobians of :func:`act`: J_pose = [I, -hat(S x), S x] (..., 3, 7), J_point = s R.
+
+    ``value (..., 3)`` in the points' unit; J_pose is in a left perturbation, xi = (rho, phi, sigma):
+    metres, radians, log-scale.
+    """
     value = act(S, x)
     J_point = np.broadcast_to(matrix(S)[..., :3, :3], (*value.shape, 3))
     return Acted(value, blocks([[np.eye(3), -so3.hat(value), value[..., None]]]), J_point)
 
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`compose`: I in a, Ad_a in b."""
+    """Value and Jacobians of :func:`compose`: I in a, Ad_a in b.
+
+    Elements ``(..., 4, 4)``; J_a and J_b ``(..., 7, 7)`` are in left perturbations, xi = (rho, phi, sigma):
+    metres, radians, log-scale.
+    """
     return combined(compose(a, b), np.eye(DOF), adjoint(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`between`: -Ad of S_a^-1 in a, Ad of S_a^-1 in b."""
+    """Value and Jacobians of :func:`between`: -Ad of S_a^-1 in a, Ad of S_a^-1 in b.
+
+    Elements ``(..., 4, 4)``; J_a and J_b ``(..., 7, 7)`` are in left perturbations, xi = (rho, phi, sigma):
+    metres, radians, log-scale.
+    """
     Ad = adjoint(inverse(a))
     return combined(between(a, b), -Ad, Ad)
 
 
 def inverse_with_jacobians(S: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`inverse`: -Ad of S^-1."""
+    """Value and Jacobian of :func:`inverse`: -Ad of S^-1.
+
+    Elements ``(..., 4, 4)``; J_pose ``(..., 7, 7)`` is in a left perturbation, xi = (rho, phi, sigma):
+    metres, radians, log-scale.
+    """
     value = inverse(S)
     return Unary(value, -adjoint(value))
 
 
 def log_with_jacobians(S: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
+    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there.
+
+    An element ``(..., 4, 4)``; J_pose ``(..., 7, 7)`` is in a left perturbation, xi = (rho, phi, sigma):
+    metres, radians, log-scale.
+    """
     xi = log(S)
     return Unary(xi, left_jacobian_inverse(xi))

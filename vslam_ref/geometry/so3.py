@@ -2,7 +2,7 @@ r"""SO(3), the rotations of space, as matrices ``R (..., 3, 3)``.
 
 A tangent vector ``phi (..., 3)`` is a rotation vector: its direction is the axis, its length :math:`\theta`
 the angle in radians.  Perturbations act from the left, ``R <- Exp(phi) R``.  ``R_a_b`` turns coordinates in
-b to coordinates in a.
+b to coordinates in a.  Matrices have no unit; arrays of other shapes raise ValueError.
 
 Accuracy: every function is within 1e-14 of the exact value (relative, in the Frobenius norm) for angles up to
 :math:`2\pi`.  The inverse of the left Jacobian has a pole at :math:`2\pi`, and
@@ -28,17 +28,25 @@ DOF = 3
 
 
 def identity(shape: tuple[int, ...] = ()) -> Array:
-    """Identity rotations, shape (*shape, 3, 3)."""
+    """Identity rotations, shape (*shape, 3, 3).
+
+    No unit.
+    """
     return np.broadcast_to(np.eye(3), (*shape, 3, 3)).copy()
 
 
 def matrix(R: ArrayLike) -> Array:
-    """The element as a matrix: itself, shape (..., 3, 3)."""
+    """The element as a matrix: itself, shape (..., 3, 3).
+
+    No unit.
+    """
     return as_array("R", R, 3, 3)
 
 
 def hat(phi: ArrayLike) -> Array:
     """Matrix Phi with Phi x = phi x x (cross product), shape (..., 3) -> (..., 3, 3).
+
+    ``phi (..., 3)`` in radians.
 
     Implements :eq:`eq-hat`.
 
@@ -53,7 +61,10 @@ def hat(phi: ArrayLike) -> Array:
 
 
 def vee(Phi: ArrayLike) -> Array:
-    """Undo :func:`hat`, shape (..., 3, 3) -> (..., 3); a symmetric part is ignored."""
+    """Undo :func:`hat`, shape (..., 3, 3) -> (..., 3); a symmetric part is ignored.
+
+    Returns ``phi (..., 3)`` in radians.
+    """
     Phi = as_array("Phi", Phi, 3, 3)
     pairs = ((2, 1), (0, 2), (1, 0))
     return np.stack([(Phi[..., i, j] - Phi[..., j, i]) / 2 for i, j in pairs], -1)
@@ -61,6 +72,8 @@ def vee(Phi: ArrayLike) -> Array:
 
 def exp(phi: ArrayLike) -> Array:
     """Rotation matrix of a rotation vector, shape (..., 3) -> (..., 3, 3).
+
+    ``phi (..., 3)`` in radians.
 
     Implements :eq:`eq-rodrigues`: I + c_1 Phi + c_2 Phi^2.
 
@@ -75,6 +88,8 @@ def exp(phi: ArrayLike) -> Array:
 def log(R: ArrayLike) -> Array:
     """Rotation vector with Exp(phi) = R and an angle in [0, pi], shape (..., 3, 3) -> (..., 3).
 
+    Returns ``phi (..., 3)`` in radians.
+
     Implements :eq:`eq-log-rotation`.  It goes through the quaternion, which is well conditioned at every
     angle: arccos((tr R - 1) / 2) would lose half of all digits near 0 and near pi, and the antisymmetric
     part its direction near pi.  At pi itself both ends of the axis are right; see
@@ -84,37 +99,57 @@ def log(R: ArrayLike) -> Array:
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product R_a R_b, shapes (..., 3, 3)."""
+    """Product R_a R_b, shapes (..., 3, 3).
+
+    Elements T_a_b and T_b_c give T_a_c.
+    """
     return np.asarray(as_array("a", a, 3, 3) @ as_array("b", b, 3, 3))
 
 
 def inverse(R: ArrayLike) -> Array:
-    """Transpose, shape (..., 3, 3)."""
+    """Transpose, shape (..., 3, 3).
+
+    An element T_a_b gives T_b_a.
+    """
     return transpose(as_array("R", R, 3, 3)).copy()
 
 
 def between(a: ArrayLike, b: ArrayLike) -> Array:
-    """R_a^-1 R_b, shapes (..., 3, 3)."""
+    """R_a^-1 R_b, shapes (..., 3, 3).
+
+    Elements T_w_a and T_w_b give T_a_b.
+    """
     return compose(inverse(a), b)
 
 
 def act(R: ArrayLike, x: ArrayLike) -> Array:
-    """Turn points ``x (..., 3)``."""
+    """Turn points ``x (..., 3)``.
+
+    Points in any unit; the result has the same.
+    """
     return times(as_array("R", R, 3, 3), as_array("x", x, 3))
 
 
 def ad(phi: ArrayLike) -> Array:
-    """Matrix of the Lie bracket, vee of hat(a) hat(b) - hat(b) hat(a): hat itself, the cross product."""
+    """Matrix of the Lie bracket, vee of hat(a) hat(b) - hat(b) hat(a): hat itself, the cross product.
+
+    ``phi (..., 3)`` in radians; shape of the result (..., 3, 3).
+    """
     return hat(phi)
 
 
 def adjoint(R: ArrayLike) -> Array:
-    """Matrix with R Exp(phi) R^-1 = Exp(Ad phi), shape (..., 3, 3): R itself."""
+    """Matrix with R Exp(phi) R^-1 = Exp(Ad phi), shape (..., 3, 3): R itself.
+
+    No unit; maps tangent vectors in radians.
+    """
     return as_array("R", R, 3, 3).copy()
 
 
 def left_jacobian(phi: ArrayLike) -> Array:
     """J with Exp(phi + d) = Exp(J d) Exp(phi) to first order, shape (..., 3) -> (..., 3, 3).
+
+    ``phi (..., 3)`` in radians.
 
     Implements :eq:`eq-v`: I + c_2 Phi + c_3 Phi^2, the average of the rotations on the way.
     The right Jacobian is that of -phi, the transpose.
@@ -127,6 +162,8 @@ def left_jacobian(phi: ArrayLike) -> Array:
 def left_jacobian_inverse(phi: ArrayLike) -> Array:
     """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); it exists for angles below 2 pi.
 
+    ``phi (..., 3)`` in radians; shape of the result (..., 3, 3).
+
     Implements :eq:`eq-v-inverse`.
     """
     phi = as_array("phi", phi, 3)
@@ -136,23 +173,34 @@ def left_jacobian_inverse(phi: ArrayLike) -> Array:
 
 
 def perturb(R: ArrayLike, phi: ArrayLike) -> Array:
-    """Exp(phi) R, shapes (..., 3, 3) and (..., 3)."""
+    """Exp(phi) R, shapes (..., 3, 3) and (..., 3).
+
+    ``phi (..., 3)`` in radians, in the frame a of T_a_b.
+    """
     return compose(exp(phi), R)
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Turn at constant speed from a (fraction 0) to b (1), the short way round; shapes (..., 3, 3), (...)."""
+    """Turn at constant speed from a (fraction 0) to b (1), the short way round; shapes (..., 3, 3), (...).
+
+    Elements and result ``(..., 3, 3)`` map to the same frame; ``fraction (...)`` has no unit.
+    """
     fraction = np.asarray(fraction, dtype=np.float64)[..., None]
     return compose(a, exp(fraction * log(between(a, b))))
 
 
 def random(rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Array:
-    """Uniform rotations (Haar measure), shape (*shape, 3, 3)."""
+    """Uniform rotations (Haar measure), shape (*shape, 3, 3).
+
+    No unit.
+    """
     return quaternion.matrix(quaternion.random(rng, shape))
 
 
 def nearest(M: ArrayLike) -> Array:
     """Rotation nearest to ``M (..., 3, 3)``; ValueError where it is not unique.
+
+    No unit.
 
     See :func:`.nearest_rotation`.
     """
@@ -160,28 +208,46 @@ def nearest(M: ArrayLike) -> Array:
 
 
 def act_with_jacobians(R: ArrayLike, x: ArrayLike) -> Acted:
-    """Value and Jacobians of :func:`act`: J_pose = -hat(R x), J_point = R."""
+    """Value and Jacobians of :func:`act`: J_pose = -hat(R x), J_point = R.
+
+    ``value (..., 3)`` in the points' unit; J_pose is in a left perturbation, ``phi (..., 3)`` in radians.
+    """
     value = act(R, x)
     return Acted(value, -hat(value), np.broadcast_to(matrix(R), (*value.shape, 3)))
 
 
 def compose_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`compose`: Exp(d) goes through a as Exp(R_a d)."""
+    """Value and Jacobians of :func:`compose`: Exp(d) goes through a as Exp(R_a d).
+
+    Elements ``(..., 3, 3)``; J_a and J_b ``(..., 3, 3)`` are in left perturbations, ``phi (..., 3)`` in
+    radians.
+    """
     return combined(compose(a, b), np.eye(DOF), matrix(a))
 
 
 def between_with_jacobians(a: ArrayLike, b: ArrayLike) -> Combined:
-    """Value and Jacobians of :func:`between`: -R_a^-1 and R_a^-1."""
+    """Value and Jacobians of :func:`between`: -R_a^-1 and R_a^-1.
+
+    Elements ``(..., 3, 3)``; J_a and J_b ``(..., 3, 3)`` are in left perturbations, ``phi (..., 3)`` in
+    radians.
+    """
     return combined(between(a, b), -inverse(a), inverse(a))
 
 
 def inverse_with_jacobians(R: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`inverse`: -R^-1."""
+    """Value and Jacobian of :func:`inverse`: -R^-1.
+
+    Elements ``(..., 3, 3)``; J_pose ``(..., 3, 3)`` is in a left perturbation, ``phi (..., 3)`` in radians.
+    """
     value = inverse(R)
     return Unary(value, -value)
 
 
 def log_with_jacobians(R: ArrayLike) -> Unary:
-    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there."""
+    """Value and Jacobian of :func:`log`: the inverse of the left Jacobian there.
+
+    An element ``(..., 3, 3)``; J_pose ``(..., 3, 3)`` is in a left perturbation, ``phi (..., 3)`` in
+    radians.
+    """
     phi = log(R)
     return Unary(phi, left_jacobian_inverse(phi))

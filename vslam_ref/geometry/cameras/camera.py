@@ -61,31 +61,31 @@ class Camera:
 
     @property
     def params(self) -> Array:
-        """All intrinsics, shape (n,)."""
+        """All intrinsics, shape (n,): pixels, then the lens's parameters."""
         return np.array([getattr(self, name) for name in self.names()], dtype=np.float64)
 
     @classmethod
     def from_params(cls, params: ArrayLike) -> Self:
-        """Camera from a vector in the order of ``names()``."""
+        """Camera from a vector (n,) in the order of ``names()``: pixels, then the lens's parameters."""
         values = as_array(f"params of {cls.__name__}", params, len(cls.names()))
         return cls(*values.tolist())
 
     @property
     def matrix(self) -> Array:
-        """K, shape (3, 3)."""
+        """K, shape (3, 3), pixels."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @property
     def max_angle(self) -> float:
-        """Angle off the axis, radians, at which the invertible field ends."""
+        """Angle off the axis, radians, at which the invertible field ends; a number, shape ()."""
         return self.lens.max_angle(self.params[4:])
 
     def project(self, X_cam: ArrayLike) -> Projection:
-        """Pixels of points (..., 3) in the camera's frame; see :func:`.projection.project`."""
+        """Pixels (..., 2) of points (..., 3) in the camera's frame; see :func:`.projection.project`."""
         return projection.project(self.params, X_cam, lens=self.lens)
 
     def project_with_jacobians(self, X_cam: ArrayLike) -> ProjectionJacobians:
-        """:meth:`project` with Jacobians in the point and in ``params``."""
+        """:meth:`project` with Jacobians (..., 2, 3) in the point and (..., 2, n) in ``params``, pixels per unit."""
         return projection.project_with_jacobians(self.params, X_cam, lens=self.lens)
 
     def unproject(self, uv: ArrayLike) -> Rays:
@@ -93,15 +93,15 @@ class Camera:
         return projection.unproject(self.params, uv, lens=self.lens)
 
     def unproject_with_jacobians(self, uv: ArrayLike) -> RayJacobians:
-        """:meth:`unproject` with the Jacobian of the bearing in the pixel."""
+        """:meth:`unproject` with the Jacobian (..., 3, 2) of the bearing in the pixel."""
         return projection.unproject_with_jacobians(self.params, uv, lens=self.lens)
 
     def pixel_from_world(self, T_cam_world: ArrayLike, X_world: ArrayLike) -> Projection:
-        """Pixels of world points; see :func:`.projection.pixel_from_world`."""
+        """Pixels (..., 2) of world points (..., 3); see :func:`.projection.pixel_from_world`."""
         return projection.pixel_from_world(self.params, T_cam_world, X_world, lens=self.lens)
 
     def pixel_from_world_with_jacobians(
         self, T_cam_world: ArrayLike, X_world: ArrayLike
     ) -> WorldProjectionJacobians:
-        """:meth:`pixel_from_world` with Jacobians in pose, point and intrinsics."""
+        """:meth:`pixel_from_world` with Jacobians in pose (..., 2, 6), point (..., 2, 3), intrinsics (..., 2, n)."""
         return projection.pixel_from_world_with_jacobians(self.params, T_cam_world, X_world, lens=self.lens)

@@ -122,7 +122,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_with_jacobians(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobians in the point and in ``k``; same parameters.
+    """:func:`distort` and its Jacobians in the point (..., 2, 3), per unit of X, and in ``k`` (..., 2, n).
 
     Implements :eq:`eq-fisheye-jacobian`.
     dg/d(x, y) = e (x, y) with e = (z/R^2 - g)/rho^2 and dg/dz = -1/R^2; with p = theta^2,
@@ -165,7 +165,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     k : array_like, shape (..., 4)
         k1 to k4.
     xd : array_like, shape (..., 2)
-        Distorted positions.
+        Distorted positions, in focal lengths (no unit).
 
     Returns
     -------
@@ -201,7 +201,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
 
 
 def max_angle(k: ArrayLike) -> float:
-    """Half of the invertible field, radians."""
+    """Half of the invertible field of parameters (n,), a number in radians."""
     return float(field_angle(k))
 
 

@@ -76,7 +76,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_with_jacobians(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobians in the point and in omega; same parameters.
+    """:func:`distort` and its Jacobians in the point (..., 2, 3), per unit of X, and in omega (..., 2, 1).
 
     Implements :eq:`eq-fov-jacobian` and :eq:`eq-fov-omega`.
     dxd/dxn = F I + 2 F_q xn xn^T with F_q = A S' T^2, and dF/domega = A' S + A S' 2 T T' q, T' = 1 + T^2/4.
@@ -104,7 +104,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     k : array_like, shape (..., 1)
         omega.
     xd : array_like, shape (..., 2)
-        Distorted normalised positions.
+        Distorted normalised positions, in focal lengths (no unit).
 
     Returns
     -------
@@ -128,7 +128,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
 
 
 def max_angle(k: ArrayLike) -> float:
-    """Half of the field, radians: a right angle less 1e-6, whatever omega is."""
+    """Half of the field, a number in radians: a right angle less 1e-6 for every ``k (1,)``."""
     return float(np.arctan(MAX_TAN))
 
 

@@ -115,7 +115,7 @@ class Lens(NamedTuple):
 
 
 def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
-    """Divide by the depth: xn (..., 2), zero where the point is not in front of the camera, and that flag.
+    """Divide points (..., 3) of any unit by their depth: xn (..., 2), zero where the point is not in front of the camera, and that flag.
 
     In front is z > ``MIN_DEPTH`` with x and y less than ``MAX_TAN`` z in size; NaN and infinity are not.
 
@@ -135,7 +135,7 @@ def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
 
 
 def normalise_jacobian(X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`normalise` with its Jacobian, in the form of a lens without parameters."""
+    """:func:`normalise` with its Jacobian (..., 2, 3), per unit of X, in the form of a lens without parameters."""
     X = as_array("X_cam", X_cam, 3)
     xn, front = normalise(X)
     J = np.zeros((*front.shape, 2, 3))
@@ -146,6 +146,6 @@ def normalise_jacobian(X_cam: ArrayLike) -> DistortedJacobians:
 
 
 def rays_through(xn: Array, valid: BoolArray) -> Rays:
-    """Unit bearings of normalised positions; the axis where not valid."""
+    """Unit bearings (..., 3) of normalised positions (..., 2); the optical axis where not valid."""
     X = np.concatenate([np.where(valid[..., None], xn, 0.0), np.ones((*xn.shape[:-1], 1))], -1)
     return Rays(X / np.linalg.norm(X, axis=-1, keepdims=True), valid)

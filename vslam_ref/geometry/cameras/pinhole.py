@@ -23,7 +23,7 @@ from vslam_ref.geometry.cameras.interface import (
 
 
 def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
-    """Normalised position of points in front of the camera; ``k`` is empty, shape (..., 0).
+    """Normalised position (..., 2), no unit, of points ``X_cam (..., 3)`` in any unit; ``k`` is empty (..., 0).
 
     Examples
     --------
@@ -34,19 +34,19 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_jacobian(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobian in the point, [[1, 0, -x/z], [0, 1, -y/z]] / z."""
+    """:func:`distort` and its Jacobian (..., 2, 3) in the point, per unit: [[1, 0, -x/z], [0, 1, -y/z]] / z."""
     return normalise_jacobian(X_cam)
 
 
 def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
-    """Ray through a normalised position, shape (..., 2)."""
+    """Ray (..., 3) through a normalised position (..., 2), no unit."""
     xd = as_array("xd", xd, 2)
     valid: BoolArray = np.all(np.abs(xd) < MAX_TAN, axis=-1)
     return rays_through(xd, valid)
 
 
 def max_angle(k: ArrayLike) -> float:
-    """Half of the field, radians: a right angle less 1e-6."""
+    """Half of the field, a number in radians: a right angle less 1e-6; ``k (0,)``."""
     return float(np.arctan(MAX_TAN))
 
 

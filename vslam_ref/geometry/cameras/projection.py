@@ -66,7 +66,7 @@ def project(params: ArrayLike, X_cam: ArrayLike, *, lens: Lens) -> Projection:
 
 
 def project_with_jacobians(params: ArrayLike, X_cam: ArrayLike, *, lens: Lens) -> ProjectionJacobians:
-    """:func:`project` and its Jacobians in the point and in the parameters.
+    """:func:`project` and its Jacobians in the point (..., 2, 3) and in the parameters (..., 2, 4 + k), pixels.
 
     Implements :eq:`eq-jacobian-point` and :eq:`eq-jacobian-intrinsics`.
     duv/dX = diag(f) dxd/dX; duv/d(fx, fy, cx, cy) = [[xd, 0, 1, 0], [0, yd, 0, 1]]; duv/dk = diag(f) dxd/dk.
@@ -107,7 +107,7 @@ def unproject(params: ArrayLike, uv: ArrayLike, *, lens: Lens) -> Rays:
 
 
 def unproject_with_jacobians(params: ArrayLike, uv: ArrayLike, *, lens: Lens) -> RayJacobians:
-    """:func:`unproject` and the Jacobian of the bearing in the pixel.
+    """:func:`unproject` and the Jacobian (..., 3, 2) of the bearing in the pixel.
 
     Implements :eq:`eq-jacobian-ray`.
     The Jacobian J of the projection at the bearing b has J b = 0, since depth does not matter.  The
@@ -152,7 +152,11 @@ def pixel_from_world(
 def pixel_from_world_with_jacobians(
     params: ArrayLike, T_cam_world: ArrayLike, X_world: ArrayLike, *, lens: Lens
 ) -> WorldProjectionJacobians:
-    """:func:`pixel_from_world` and its Jacobians in pose (left perturbation), world point and intrinsics."""
+    """:func:`pixel_from_world` and its Jacobians.
+
+    In the pose (..., 2, 6), perturbed from the left by xi = (rho, phi) in metres and radians; in the world point
+    (..., 2, 3); in the intrinsics (..., 2, 4 + k).  All are of pixels.
+    """
     X_cam = _cam_from_world(T_cam_world, X_world)
     at = project_with_jacobians(params, X_cam, lens=lens)
     J_pose, J_world = pose_jacobian(at.J_point, X_cam), at.J_point @ se3.rotation(T_cam_world)
@@ -176,6 +180,7 @@ def pose_jacobian(J_point: ArrayLike, X_cam: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., m, 6)
+        Per metre (or the unit of X_cam) and per radian.
 
     Examples
     --------

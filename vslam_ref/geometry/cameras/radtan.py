@@ -78,7 +78,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_with_jacobians(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobians in the point and in ``k``; same parameters.
+    """:func:`distort` and its Jacobians in the point (..., 2, 3), per unit of X, and in ``k`` (..., 2, n).
 
     Implements :eq:`eq-radtan-jacobian`.
     dxd/dxn = G I + 2 G_q xn xn^T + 2 (p xn^T + xn p^T + (p . xn) I).
@@ -110,7 +110,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     k : array_like, shape (..., 5) or (..., 8)
         Lens parameters.
     xd : array_like, shape (..., 2)
-        Distorted normalised positions.
+        Distorted normalised positions, in focal lengths (no unit).
 
     Returns
     -------
@@ -141,7 +141,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
 
 
 def max_angle(k: ArrayLike) -> float:
-    """Half of the invertible field, radians."""
+    """Half of the invertible field of parameters (n,), a number in radians."""
     return float(np.arctan(field_radius(k)))
 
 
