@@ -85,7 +85,7 @@ class Camera:
         return projection.project(self.params, X_cam, lens=self.lens)
 
     def project_with_jacobians(self, X_cam: ArrayLike) -> ProjectionJacobians:
-        """:meth:`project` with Jacobians (..., 2, 3) in the point and (..., 2, n) in ``params``, pixels per unit."""
+        """:meth:`project` with Jacobians of pixels, (..., 2, 3) in the point, (..., 2, n) in ``params``."""
         return projection.project_with_jacobians(self.params, X_cam, lens=self.lens)
 
     def unproject(self, uv: ArrayLike) -> Rays:
@@ -103,5 +103,5 @@ class Camera:
     def pixel_from_world_with_jacobians(
         self, T_cam_world: ArrayLike, X_world: ArrayLike
     ) -> WorldProjectionJacobians:
-        """:meth:`pixel_from_world` with Jacobians in pose (..., 2, 6), point (..., 2, 3), intrinsics (..., 2, n)."""
+        """:meth:`pixel_from_world` with Jacobians (..., 2, m) of pixels in pose, point and intrinsics."""
         return projection.pixel_from_world_with_jacobians(self.params, T_cam_world, X_world, lens=self.lens)

@@ -115,9 +115,10 @@ class Lens(NamedTuple):
 
 
 def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
-    """Divide points (..., 3) of any unit by their depth: xn (..., 2), zero where the point is not in front of the camera, and that flag.
+    """Divide points (..., 3) of any unit by their depth: xn (..., 2), and whether each is in front (...).
 
-    In front is z > ``MIN_DEPTH`` with x and y less than ``MAX_TAN`` z in size; NaN and infinity are not.
+    In front is z > ``MIN_DEPTH`` with x and y less than ``MAX_TAN`` z in size; NaN and infinity are not.  xn is
+    zero for a point that is not in front.
 
     Examples
     --------
@@ -135,7 +136,7 @@ def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
 
 
 def normalise_jacobian(X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`normalise` with its Jacobian (..., 2, 3), per unit of X, in the form of a lens without parameters."""
+    """:func:`normalise` with its Jacobian (..., 2, 3), per unit of X, as a lens without parameters."""
     X = as_array("X_cam", X_cam, 3)
     xn, front = normalise(X)
     J = np.zeros((*front.shape, 2, 3))

@@ -23,7 +23,7 @@ from vslam_ref.geometry.cameras.interface import (
 
 
 def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
-    """Normalised position (..., 2), no unit, of points ``X_cam (..., 3)`` in any unit; ``k`` is empty (..., 0).
+    """Normalised position (..., 2) of points ``X_cam (..., 3)`` in any unit; ``k`` is empty, (..., 0).
 
     Examples
     --------
@@ -34,7 +34,7 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_jacobian(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobian (..., 2, 3) in the point, per unit: [[1, 0, -x/z], [0, 1, -y/z]] / z."""
+    """:func:`distort` and its Jacobian (..., 2, 3) in the point: [[1, 0, -x/z], [0, 1, -y/z]] / z."""
     return normalise_jacobian(X_cam)
 
 

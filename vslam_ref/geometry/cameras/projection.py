@@ -66,7 +66,7 @@ def project(params: ArrayLike, X_cam: ArrayLike, *, lens: Lens) -> Projection:
 
 
 def project_with_jacobians(params: ArrayLike, X_cam: ArrayLike, *, lens: Lens) -> ProjectionJacobians:
-    """:func:`project` and its Jacobians in the point (..., 2, 3) and in the parameters (..., 2, 4 + k), pixels.
+    """:func:`project` and its Jacobians of pixels in the point (..., 2, 3) and parameters (..., 2, 4 + k).
 
     Implements :eq:`eq-jacobian-point` and :eq:`eq-jacobian-intrinsics`.
     duv/dX = diag(f) dxd/dX; duv/d(fx, fy, cx, cy) = [[xd, 0, 1, 0], [0, yd, 0, 1]]; duv/dk = diag(f) dxd/dk.
@@ -154,8 +154,8 @@ def pixel_from_world_with_jacobians(
 ) -> WorldProjectionJacobians:
     """:func:`pixel_from_world` and its Jacobians.
 
-    In the pose (..., 2, 6), perturbed from the left by xi = (rho, phi) in metres and radians; in the world point
-    (..., 2, 3); in the intrinsics (..., 2, 4 + k).  All are of pixels.
+    In the pose (..., 2, 6), perturbed from the left by xi = (rho, phi) in metres and radians; in the world
+    point (..., 2, 3); in the intrinsics (..., 2, 4 + k).  All are of pixels.
     """
     X_cam = _cam_from_world(T_cam_world, X_world)
     at = project_with_jacobians(params, X_cam, lens=lens)
