@@ -117,8 +117,8 @@ class Lens(NamedTuple):
 def normalise(X_cam: ArrayLike) -> tuple[Array, BoolArray]:
     """Divide points (..., 3) of any unit by their depth: xn (..., 2), and whether each is in front (...).
 
-    In front is z > ``MIN_DEPTH`` with x and y less than ``MAX_TAN`` z in size; NaN and infinity are not.  xn is
-    zero for a point that is not in front.
+    In front is z > ``MIN_DEPTH`` with x and y less than ``MAX_TAN`` z in size; NaN and infinity are not.
+    For a point that is not in front, xn is zero.
 
     Examples
     --------
