@@ -120,8 +120,8 @@ def davenport(M: np.ndarray) -> np.ndarray:
 def test_nearest_is_davenports(seed: int) -> None:
     """Half of these have a negative determinant.  Error: eps over the gap of eigenvalues, here above 0.02.
 
-    U and V are orthonormal to some 8 eps each, and so R to 16: its determinant is off by half of the trace, 24
-    eps; the elimination that computes it adds 8.
+    U and V are orthonormal to some 8 eps each, and so R to 16: its determinant is off by half of the trace,
+    24 eps; the elimination that computes it adds 8.
     """
     M = np.random.default_rng(seed).normal(size=(3, 3))
     found = nearest_rotation(M)

@@ -29,10 +29,7 @@ _POWERS = 19  # the first one left out is 190 / 21! < 4e-18, in C at theta = 0, 
 
 
 def rotation_coefficients(theta2: Array) -> Array:
-    """c_0 ... c_5 of squared angles, rad^2, shape (...) -> (6, ...).
-
-    Implements :eq:`eq-coefficients`.
-    """
+    """c_0 ... c_5 of squared angles, rad^2, shape (...) -> (6, ...)."""
     small = theta2 < SMALL**2
     c = np.empty((6, *theta2.shape))
     # small: two series at the top, then downwards
@@ -42,6 +39,7 @@ def rotation_coefficients(theta2: Array) -> Array:
         for n in range(_TERMS - 1, -1, -1):
             total = 1.0 / factorial(2 * n + k) - q * total
         c[k] = total
+    # eq-coefficients
     for k in (3, 2, 1, 0):
         c[k] = 1.0 / factorial(k) - q * c[k + 2]
     # large: closed forms at the bottom, then upwards; 1 - cos = 2 sin^2(theta / 2) loses nothing
