@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.bench import filterpy_peer
-from vslam_ref.bench.ekf_steps import array_step
+from vslam_ref.bench.filters import array_step
 from vslam_ref.bench.rows import row
 from vslam_ref.support.timing import paired
 from vslam_ref.worlds.mapped_vehicle import MappedVehicle

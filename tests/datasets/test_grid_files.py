@@ -69,7 +69,7 @@ def test_negated_and_pgm_pictures_are_read(tmp_path: Path, grid: LogOddsGrid) ->
         ("origin: [-0.7", "origin: [-0.73", "expected multiples of the resolution"),
         ("negate: 0", "negate: maybe", "negate is 'maybe'; expected one of 0, 1"),
         ("m.png", "other.png", "image is 'other.png'; expected a picture beside"),
-        ("m.png", "m.yaml", "not a picture"),
+        ("m.png", "m.yaml", "no image that can be read"),
     ],
 )
 def test_a_damaged_map_is_answered(tmp_path: Path, grid: LogOddsGrid, old: str, new: str, what: str) -> None:

@@ -23,20 +23,22 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from vslam_ref.bench.ekf_steps import array_step, class_step
 from vslam_ref.bench.filterpy_peer import WAYS, filterpy_step
 from vslam_ref.bench.imports import imports
 from vslam_ref.bench.rows import Row, each_backend, row
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import EkfSlam
-from vslam_ref.filters.estimates import SlamFilter
+from vslam_ref.filters.ekf_step import ekf_step
+from vslam_ref.filters.estimates import SlamFilter, room_for_innovation
 from vslam_ref.support.timing import paired
-from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, MappedVehicle, cycle_ratios
+from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, SEEN, MappedVehicle, cycle_ratios
 from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
 
 SIZES = (10, 20, 50, 100, 200)
@@ -79,6 +81,25 @@ def steps(backend: str, quick: bool) -> list[Row]:
             rows.append(row("EKF-1", case, backend, result.ratio[name], "x", bound, below=False))
     growth = float(np.log(seconds[200] / seconds[50]) / np.log(4.0))
     return [*rows, row("EKF-4", "exponent of n, 50 to 200", backend, growth, "", GOAL_EKF_4)]
+
+
+def class_step(world: MappedVehicle) -> Callable[[], object]:
+    """One prediction and one joint update of five landmarks by :class:`EkfSlam`, all checks included."""
+    slam, z = world.start(EkfSlam), world.z[None, world.seen]
+
+    def step() -> None:
+        slam.predict(world.increment())
+        slam.update(world.seen, z, world.cov_z)
+
+    return step
+
+
+def array_step(world: MappedVehicle) -> Callable[[], object]:
+    """The same step by :func:`ekf_step` on plain arrays."""
+    b = world.start(EkfSlam).blocks
+    columns, z, cov_z = b.columns(world.seen), world.z[None, world.seen], np.tile(world.cov_z, (SEEN, 1, 1))
+    state = (b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm)
+    return partial(ekf_step, *state, *world.increment(), columns, z, cov_z, *room_for_innovation(z))
 
 
 def cycles(backend: str, quick: bool) -> list[Row]:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.picture_size import require_size
-from vslam_ref.datasets.text import FormatError
+from vslam_ref.datasets.pictures import read_grey
 from vslam_ref.datasets.yaml_nodes import Node, read_yaml
 from vslam_ref.grids.lattice import MAX_CELLS, Lattice
 from vslam_ref.grids.log_odds import DECIDED, LogOddsGrid, log_odds
@@ -97,8 +97,6 @@ def read_ros_map(path: Path) -> LogOddsGrid:
 
 
 def _picture(node: Node) -> Array:
-    import cv2
-
     path = node.path.parent / node.text()
     try:
         there = path.is_file()
@@ -107,12 +105,4 @@ def _picture(node: Node) -> Array:
     if not there:
         raise node.error(f"image is {node.text()!r}; expected a picture beside the YAML")
     require_size(path, MAX_CELLS)
-    try:
-        picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
-    except cv2.error:  # empty, or too large for OpenCV
-        picture = None
-    if picture is None:
-        raise FormatError(path, None, "not a picture; expected PNG or PGM")
-    if picture.size > MAX_CELLS:
-        raise FormatError(path, None, f"{picture.size} pixels; at most {MAX_CELLS}")
-    return np.asarray(picture, dtype=np.float64)
+    return read_grey(path).astype(np.float64)

@@ -36,8 +36,15 @@ def _named(names: str, found: tuple[Array, Array]) -> dict[str, Array]:
     return {name: value[0] for name, value in zip(names.split(), found, strict=True)}
 
 
-def _state(slam: EkfSlam) -> dict[str, Array]:
+def _state(slam: EkfSlam | LiftedCarlemanEkf) -> dict[str, Array]:
+    if isinstance(slam, LiftedCarlemanEkf):
+        return _named("Z P", slam.state())
     return _named("x P", slam.blocks.full())
+
+
+def _updated(slam: EkfSlam | LiftedCarlemanEkf, ids: Any, z: Array, cov_z: Array) -> dict[str, Array]:
+    slam.update(np.asarray(ids, dtype=int), z.reshape(1, -1, 2), cov_z)
+    return _state(slam)
 
 
 def _predict(
@@ -45,18 +52,6 @@ def _predict(
 ) -> dict[str, Array]:
     slam = _slam(x, P)
     slam.predict(vehicle.ackermann_increment(control[None], cov_u, wheelbase, dt))
-    return _state(slam)
-
-
-def _update(x: Array, P: Array, ids: Array, z: Array, cov_z: Array) -> dict[str, Array]:
-    slam = _slam(x, P)
-    slam.update(ids.astype(int), z[None], cov_z)
-    return _state(slam)
-
-
-def _augment(x: Array, P: Array, z: Array, cov_z: Array) -> dict[str, Array]:
-    slam = _slam(x, P)
-    slam.update([len(x)], z[None, None], cov_z)  # no landmark of the map has this number
     return _state(slam)
 
 
@@ -90,10 +85,6 @@ def _lifted(Z: Array, P: Array, control: str = "first_order") -> LiftedCarlemanE
     return slam
 
 
-def _lifted_state(slam: LiftedCarlemanEkf) -> dict[str, Array]:
-    return _named("Z P", slam.state())
-
-
 def _increment(increment: Array, cov: Array) -> vehicle.Increment:
     return vehicle.Increment(increment[None, 0], increment[None, 1], cov[None])
 
@@ -103,19 +94,7 @@ def _lifted_predict(
 ) -> dict[str, Array]:
     slam = _lifted(Z, P, control)
     slam.predict(_increment(increment, cov))
-    return _lifted_state(slam)
-
-
-def _lifted_update(Z: Array, P: Array, ids: Array, z: Array, cov_z: Array) -> dict[str, Array]:
-    slam = _lifted(Z, P)
-    slam.update(ids.astype(int), z[None], cov_z)
-    return _lifted_state(slam)
-
-
-def _lifted_augment(Z: Array, P: Array, z: Array, cov_z: Array) -> dict[str, Array]:
-    slam = _lifted(Z, P)
-    slam.update([len(Z)], z[None, None], cov_z)
-    return _lifted_state(slam)
+    return _state(slam)
 
 
 def _pose(z: Array, P: Array) -> dict[str, Array]:
@@ -166,14 +145,15 @@ TABLE: Answers = {
     ),
     "vehicle.front_wheel": lambda x, **drive: vehicle.front_wheel_step(x, **drive),
     "ekf.predict": _predict,
-    "ekf.update": _update,
-    "ekf.augment": _augment,
+    "ekf.update": lambda x, P, **seen: _updated(_slam(x, P), **seen),
+    # no landmark of the map has the number that is added
+    "ekf.augment": lambda x, P, **seen: _updated(_slam(x, P), [len(x)], **seen),
     "ekf.from_polar": _from_polar,
     "ekf.trace": _trace,
     "lift.vehicle": lambda x, P: _named("Z P_Z", moments.lifted_start(x[None], P[None], "first_order")),
     "carleman.predict": _lifted_predict,
-    "carleman.update": _lifted_update,
-    "carleman.augment": _lifted_augment,
+    "carleman.update": lambda Z, P, **seen: _updated(_lifted(Z, P), **seen),
+    "carleman.augment": lambda Z, P, **seen: _updated(_lifted(Z, P), [len(Z)], **seen),
     "lift.pose": _pose,
     "reduced.predict": _reduced_predict,
     "carleman.trace": lambda x, P, **run: _pose_steps(carleman_ekf(x, P, form="lifted"), **run),
