@@ -34,6 +34,7 @@ from vslam_ref.commands import (
     grid,
     identify,
     reproduce,
+    sample,
     vectors,
     verify,
     warm_cache,
@@ -44,6 +45,7 @@ from vslam_ref.commands import run as run_command
 PROGRAM = "vslam-ref"
 COMMANDS: dict[str, ModuleType] = {
     "list": list_command,
+    "sample": sample,
     "reproduce": reproduce,
     "run": run_command,
     "evaluate": evaluate,

@@ -54,12 +54,11 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.datasets import carmen
     from vslam_ref.experiments.grid_log import report
     from vslam_ref.experiments.grid_log.mapping import GridConfig
-    from vslam_ref.experiments.slam_log.report import check_out
     from vslam_ref.support import files
     from vslam_ref.support.config import apply_overrides, config_to_dict
     from vslam_ref.support.provenance import versions
 
-    out = check_out(options.out)
+    out = files.require_new_folder(options.out, "result.json")
     given = [] if options.resolution is None else [f"map.resolution={options.resolution!r}"]
     config = apply_overrides(GridConfig(), [*given, *options.set])
     log = carmen.read(find_log(options.log))

@@ -73,6 +73,6 @@ def _out(options: argparse.Namespace) -> Path | None:
     """Return the checked output folder, before any work."""
     if options.out is None:
         return None
-    from vslam_ref.experiments.slam_log.report import check_out
+    from vslam_ref.support import files
 
-    return check_out(options.out)
+    return files.require_new_folder(options.out, "result.json")
