@@ -87,7 +87,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=PROGRAM,
         description=DESCRIPTION,
-        epilog="example: vslam-ref reproduce iekf-fig2 --quick",
+        epilog="examples:\n  vslam-ref sample all --out samples\n  vslam-ref reproduce iekf-fig2 --quick",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {vslam_ref.__version__}")

@@ -19,8 +19,8 @@ EPILOG = (
     + "\n".join(f"  {name:<12}{what}" for name, what in {**KINDS, "all": "all of these"}.items())
     + """
 
-Each kind is a folder in DIR with a README.txt: the format, what is true, a command to try. The same seed gives
-the same bytes. DIR is new, empty, or holds samples; kinds that are not asked for stay in it.
+Each kind is a folder in DIR with a README.txt: the format, what is true, a command to try. The same seed
+gives the same bytes. DIR is new, empty, or holds samples; kinds that are not asked for stay in it.
 
 examples:
   vslam-ref sample all --out samples

@@ -209,7 +209,9 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
     clock of a thousand seconds.  What the log's reader left out is not written.
     """
     if log.drive != "differential" or robot not in ROBOTS or np.isin(truth.ids, ROBOTS).any():
-        raise ValueError(f"robot {robot}, {log.drive} drive: MRCLAM has robots 1 to 5, wheels, and landmarks from 6")
+        raise ValueError(
+            f"robot {robot}, {log.drive} drive: MRCLAM has robots 1 to 5, wheels, and landmarks from 6"
+        )
     start = log.clock_start
     seen = [
         (start + s.time, BARCODE + int(i), r, b)
@@ -217,12 +219,17 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
         for i, (r, b) in zip(s.ids.tolist(), s.polar.tolist(), strict=True)
     ]
     subjects = [*((i, i) for i in ROBOTS), *((i, BARCODE + i) for i in truth.ids.tolist())]
-    marks = [(i, x, y, 0.0, 0.0) for i, (x, y) in zip(truth.ids.tolist(), truth.landmarks.tolist(), strict=True)]
+    marks = [
+        (i, x, y, 0.0, 0.0) for i, (x, y) in zip(truth.ids.tolist(), truth.landmarks.tolist(), strict=True)
+    ]
     tables = {
         "Barcodes.dat": ("subject barcode", subjects),
-        f"Robot{robot}_Odometry.dat": ("time_s v_m_s omega_rad_s", _timed(start + log.times, log.controls)),
+        f"Robot{robot}_Odometry.dat": ("time_s v_m_s omega_rad_s", _rows(start + log.times, log.controls)),
         f"Robot{robot}_Measurement.dat": ("time_s barcode range_m bearing_rad", seen),
-        f"Robot{robot}_Groundtruth.dat": ("time_s x_m y_m theta_rad", _timed(start + truth.times, truth.poses)),
+        f"Robot{robot}_Groundtruth.dat": (
+            "time_s x_m y_m theta_rad",
+            _timed(start + truth.times, truth.poses),
+        ),
         "Landmark_Groundtruth.dat": ("subject x_m y_m sd_x_m sd_y_m", marks),
     }
     for name, (head, rows) in tables.items():
@@ -230,5 +237,5 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
         write_text(folder / name, "\n".join(lines) + "\n")
 
 
-def _timed(times: Array, values: Array) -> list[tuple[float, ...]]:
-    return [(t, *row) for t, row in zip(times.tolist(), values.tolist(), strict=True)]
+def _rows(first: Array | IntArray, values: Array) -> list[tuple[float, ...]]:
+    return [(k, *row) for k, row in zip(first.tolist(), values.tolist(), strict=True)]

@@ -31,14 +31,16 @@ def take(
     ``poses`` goes to :func:`simulated.poses`, for a board that has the ring's outer corners, too.
     """
     ringed = Board(board.columns + 2, board.rows + 2, board.square)
-    corner = se3.from_rt(np.eye(3), np.array([board.square, board.square, 0.0]))  # of the board in the ringed one
+    corner = se3.from_rt(
+        np.eye(3), np.array([board.square, board.square, 0.0])
+    )  # of the board in the ringed one
     T = se3.compose(simulated.poses(ringed, camera, size, count, rng, **poses), corner)
     xn = normalised_samples(camera, size)
     return BoardPictures(np.stack([render(board, xn, one) for one in T]), T)
 
 
 def normalised_samples(camera: Camera, size: tuple[int, int], samples: int = 3) -> Array:
-    """Viewing directions of an image of ``size`` (W, H), ``samples`` x ``samples`` spread evenly over each pixel.
+    """Viewing directions of an image of ``size`` (W, H), ``samples`` x ``samples`` evenly over each pixel.
 
     The lens is inverted at the corners of the pixels, and taken as bilinear between: over one pixel the
     second derivative of a usual lens is 1e-3 px, so this is right to 2e-4 px.

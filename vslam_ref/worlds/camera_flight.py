@@ -31,8 +31,8 @@ def estimate(truth: Trajectory, ate_rmse: float, turn_rmse: float, rng: np.rando
 
     Errors e_i of positions are a slow drift and white noise, less their part that a rigid motion of the
     path would explain.  With p_i the true positions about their mean, sum e_i = 0 and sum e_i x p_i = 0.
-    Then the matrix sum (p_i + e_i) p_i^T, from which the best rotation comes, is symmetric and positive, so that
-    rotation is the identity, and the error that remains is e itself.
+    Then the matrix sum (p_i + e_i) p_i^T, from which the best rotation comes, is symmetric and positive, so
+    the rotation is the identity, and the error that remains is e itself.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def estimate(truth: Trajectory, ate_rmse: float, turn_rmse: float, rng: np.rando
 
 
 def _not_rigid(e: Array, p: Array) -> Array:
-    """Displacements (N, 3) of points p without the part along the translations and rotations of all points."""
+    """Displacements (N, 3) of points p without their part along translations and rotations of the whole."""
     axes = np.eye(3)
     moves = [np.broadcast_to(axis, p.shape) for axis in axes] + [np.cross(axis, p) for axis in axes]
     A = np.stack([move.ravel() for move in moves], axis=-1)  # (3 N, 6)

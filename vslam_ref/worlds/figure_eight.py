@@ -88,7 +88,7 @@ class Eight(NamedTuple):
 
 
 def drive(config: EightConfig, landmarks: Array) -> Eight:
-    """Drive past landmarks (n, 2) by the filters' own motion model, :func:`vslam_ref.filters.vehicle.propagate`."""
+    """Drive past landmarks (n, 2) by the filters' own motion model, :func:`.vehicle.propagate`."""
     times = np.arange(0, config.seconds, config.dt)
     omega = np.where(np.floor(times / SWITCH) % 2 == 0, config.turn_rate, -config.turn_rate)
     controls = np.column_stack([np.full(len(times), config.speed), omega])

@@ -1,4 +1,4 @@
-"""Makers of small inputs for the commands: one module a kind, each a world of the library in a foreign format.
+"""Makers of small inputs for the commands: worlds of the library, written in foreign formats.
 
 A maker is ``make(folder, rng) -> Made``: it writes its files into a new folder.  The same generator gives the
 same bytes.  What is true stands beside the files, in the format's own way where it has one, and in

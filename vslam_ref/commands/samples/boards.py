@@ -23,7 +23,8 @@ CAMERAS: dict[str, Camera] = {
 }
 
 README = f"""\
-{PICTURES} pictures of a board of {BOARD.columns}x{BOARD.rows} inner corners, squares of {BOARD.square} m, by each of two cameras.
+{PICTURES} pictures by each of two cameras of a board with {BOARD.columns}x{BOARD.rows} inner corners and
+squares of {BOARD.square} m.
 
 format: radtan/*.png, fov/*.png, grey, {SIZE[0]} x {SIZE[1]} pixels
 true:   radtan/camera.yaml and fov/camera.yaml, the cameras that drew them (OpenCV's YAML)
@@ -34,9 +35,7 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
     """Write pictures and cameras."""
     known: dict[str, Any] = {"board": "9x6", "square_m": BOARD.square}
     for model, camera in CAMERAS.items():
-        pictures = board_pictures.take(
-            BOARD, camera, SIZE, PICTURES, rng, tilt=(0.3, 0.7), fill=(0.5, 0.85)
-        )
+        pictures = board_pictures.take(BOARD, camera, SIZE, PICTURES, rng, tilt=(0.3, 0.7), fill=(0.5, 0.85))
         (folder / model).mkdir()
         for k, image in enumerate(pictures.images):
             write_png(folder / model / f"board{k:02d}.png", image)

@@ -24,8 +24,8 @@ BAL = f"""\
 Cameras on an arc around a box of points, each with its own focal length and radial distortion (f, k1, k2).
 
 format: BAL, "bundle adjustment in the large": cameras, points and observations as numbers, one text
-        problem.txt   the start: every view turned by about {TURN} rad, views and points moved by about {MOVE} m,
-                      focal lengths 2 % off, no distortion; pixels with noise of {SIGMA_PX} px
+        problem.txt   the start: views turned by about {TURN} rad, views and points moved by about
+                      {MOVE} m, focal lengths 2 % off, no distortion; pixels with noise of {SIGMA_PX} px
 true:   truth.txt     the same with the true scene and exact pixels
         truth.json    sigma, and the cost that adjusted noise leaves (mean and standard deviation)"""
 
@@ -33,8 +33,8 @@ COLMAP = f"""\
 Cameras on an arc around a box of points, all with one OPENCV camera (fx, fy, cx, cy, k1, k2, p1, p2).
 
 format: COLMAP's text model: cameras.txt, images.txt, points3D.txt
-        model/   the start: views turned by about {TURN} rad, views and points moved by about {MOVE} m; pixels with
-                 noise of {SIGMA_PX} px
+        model/   the start: views turned by about {TURN} rad, views and points moved by about
+                 {MOVE} m; pixels with noise of {SIGMA_PX} px
 true:   truth/   the same with the true scene and exact pixels
         truth.json   sigma, and the cost that adjusted noise leaves (mean and standard deviation)"""
 
@@ -51,7 +51,9 @@ def make_bal(folder: Path, rng: np.random.Generator) -> Made:
     for name, one in (("truth", truth), ("problem", problem)):
         write_bal(folder / f"{name}.txt", BundleFile(one))
     command = "vslam-ref ba samples/bal/problem.txt"
-    return Made(BAL, (f"{command} --ply out.ply", f"{command} --loss tukey --scale 1.5"), _known(problem, 3 * 12))
+    return Made(
+        BAL, (f"{command} --ply out.ply", f"{command} --loss tukey --scale 1.5"), _known(problem, 3 * 12)
+    )
 
 
 def make_colmap(folder: Path, rng: np.random.Generator) -> Made:

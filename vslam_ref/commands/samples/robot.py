@@ -17,7 +17,7 @@ LANDMARKS = 15
 """As many as MRCLAM has."""
 
 README = f"""\
-A robot drives eights for {SECONDS:g} s among {LANDMARKS} landmarks and sees those ahead of it, with range and bearing.
+A robot drives eights for {SECONDS:g} s among {LANDMARKS} landmarks and sees those ahead of it: range and bearing.
 
 format: MRCLAM (UTIAS multi-robot localisation and mapping), one robot; each file names its columns
 true:   Robot1_Groundtruth.dat and Landmark_Groundtruth.dat, exact; truth.json has gains, offsets, delay and

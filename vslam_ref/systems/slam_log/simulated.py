@@ -20,7 +20,10 @@ FIRST_LANDMARK = 6
 
 
 def log(
-    world: Eight, calibration: Calibration, rng: np.random.Generator | None = None, clock_start: float = 1000.0
+    world: Eight,
+    calibration: Calibration,
+    rng: np.random.Generator | None = None,
+    clock_start: float = 1000.0,
 ) -> tuple[SlamLog, Truth]:
     """Log and truth of a drive.
 
@@ -73,7 +76,7 @@ def logged_increments(increments: ArrayLike, calibration: Calibration) -> Array:
 
 
 def logged_polar(polar: ArrayLike, calibration: Calibration) -> Array:
-    """Ranges (m) and bearings (rad), shape (m, 2), as a sensor logs them: :meth:`Calibration.correct` undone."""
+    """Ranges (m) and bearings (rad), shape (m, 2), as a sensor logs them: ``Calibration.correct`` undone."""
     r, b = np.asarray(polar, dtype=np.float64).T
     logged = r * np.cos(b) ** calibration.range_cosine - calibration.range_offset
     return np.stack([logged, b + calibration.bearing_offset], axis=-1)

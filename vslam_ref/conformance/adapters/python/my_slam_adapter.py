@@ -11,7 +11,7 @@ import sys
 
 WRONG = "--wrong" in sys.argv  # the mistake of a small-angle branch, to see it found
 
-# --- 1. the library: matrices are lists of rows, angles radians, a motion's tangent is (rotation, translation)
+# --- 1. the library: matrices are lists of rows, angles radians, tangents of motions rotation first
 
 
 def rotation(phi):
@@ -51,7 +51,7 @@ def pixel(params, X):
 
 
 def weights(x):
-    """sin x / x, (1 - cos x) / x^2 and (x - sin x) / x^3, without cancellation."""
+    """Sin x / x, (1 - cos x) / x^2 and (x - sin x) / x^3, without cancellation."""
     if x < 0.5:
         a = b = c = 0.0
         for k in range(9, -1, -1):  # x^18 / 21! < 1e-25
