@@ -34,7 +34,7 @@ def make_world(tmp_path: Path) -> Callable[..., World]:
     def make(name: str, noise: Calibration | None, seed: int = 0, seconds: float = 60.0) -> World:
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
-        world = figure_eight.drive(figure_eight.EightConfig(seconds=seconds), LANDMARKS)
+        world = figure_eight.drive(figure_eight.EightConfig(seconds=seconds, turn_rate=0.3), LANDMARKS)
         rng = np.random.default_rng(seed) if noise is not None else None
         log, truth = simulated.log(world, noise or Calibration(), rng)
         mrclam.write(folder, 1, log, truth)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -219,17 +220,13 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
         for i, (r, b) in zip(s.ids.tolist(), s.polar.tolist(), strict=True)
     ]
     subjects = [*((i, i) for i in ROBOTS), *((i, BARCODE + i) for i in truth.ids.tolist())]
-    marks = [
-        (i, x, y, 0.0, 0.0) for i, (x, y) in zip(truth.ids.tolist(), truth.landmarks.tolist(), strict=True)
-    ]
-    tables = {
+    marks = [(*row, 0.0, 0.0) for row in _rows(truth.ids, truth.landmarks)]
+    poses = _rows(start + truth.times, truth.poses)
+    tables: dict[str, tuple[str, list[tuple[Any, ...]]]] = {
         "Barcodes.dat": ("subject barcode", subjects),
         f"Robot{robot}_Odometry.dat": ("time_s v_m_s omega_rad_s", _rows(start + log.times, log.controls)),
         f"Robot{robot}_Measurement.dat": ("time_s barcode range_m bearing_rad", seen),
-        f"Robot{robot}_Groundtruth.dat": (
-            "time_s x_m y_m theta_rad",
-            _timed(start + truth.times, truth.poses),
-        ),
+        f"Robot{robot}_Groundtruth.dat": ("time_s x_m y_m theta_rad", poses),
         "Landmark_Groundtruth.dat": ("subject x_m y_m sd_x_m sd_y_m", marks),
     }
     for name, (head, rows) in tables.items():
@@ -237,5 +234,5 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
         write_text(folder / name, "\n".join(lines) + "\n")
 
 
-def _rows(first: Array | IntArray, values: Array) -> list[tuple[float, ...]]:
+def _rows(first: Array | IntArray, values: Array) -> list[tuple[Any, ...]]:
     return [(k, *row) for k, row in zip(first.tolist(), values.tolist(), strict=True)]

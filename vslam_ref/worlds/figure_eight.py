@@ -4,8 +4,8 @@ r"""A robot on wheels that drives an eight among landmarks, with exact truth.
 
           .      .       .
          _____       _____         two circles, one to the left, one to the right, driven in turn
-      . /     \  .  /     \  .     (differential drive: v constant, omega of alternating sign)
-       |       | o |       |
+      . /     \  .  /     \  .     (differential drive: v constant, omega of alternating sign),
+       |       | o |       |       again and again; the start is in the middle
         \_____/     \_____/        landmarks all around; a camera that looks ahead reports range
           .      .       .         and bearing of those within its field and its reach
 
@@ -25,18 +25,20 @@ from vslam_ref.filters import observation, vehicle
 
 START = (0.3, -0.2, 0.4)
 """Pose at time 0: metres, metres, radians."""
-SWITCH = 8.0 * np.pi
-"""Seconds of a turn to one side."""
 
 
 @dataclass(frozen=True)
 class EightConfig:
-    """Course and camera; metres, seconds, radians."""
+    """Course and camera; metres, seconds, radians.
+
+    ``side_seconds`` is the time of a turn to one side: with 2 pi / ``turn_rate`` the eight closes.
+    """
 
     seconds: float = 60.0
     dt: float = 0.05
     speed: float = 0.5
-    turn_rate: float = 0.3
+    turn_rate: float = 0.25
+    side_seconds: float = 8 * np.pi
     steps_between_sightings: int = 10
     field: float = 1.0
     reach: float = 6.0
@@ -90,7 +92,8 @@ class Eight(NamedTuple):
 def drive(config: EightConfig, landmarks: Array) -> Eight:
     """Drive past landmarks (n, 2) by the filters' own motion model, :func:`.vehicle.propagate`."""
     times = np.arange(0, config.seconds, config.dt)
-    omega = np.where(np.floor(times / SWITCH) % 2 == 0, config.turn_rate, -config.turn_rate)
+    side = np.floor(times / config.side_seconds)
+    omega = np.where(side % 2 == 0, config.turn_rate, -config.turn_rate)
     controls = np.column_stack([np.full(len(times), config.speed), omega])
     poses = np.zeros((len(times), 3))
     poses[0] = START

@@ -20,8 +20,8 @@ needs Python only, nothing installed: write yours in any language, by this examp
 format: one request a line on standard input, one reply a line on standard output, JSON (docs/adapters.md)
         convention.json   what the library means by its answers: its rotations come before its translations
 true:   every answer is right. With '--wrong' the library takes the Jacobian for small angles with the sign of
-        the right one, and 'vslam-ref verify' names that mistake (status 1); without convention.json, it
-        names the order that was not declared."""
+        the right one, and 'vslam-ref verify' names that mistake (status 1); without convention.json,
+        motions fail: their tangent vectors are read in the wrong order."""
 
 
 def make(folder: Path, rng: np.random.Generator) -> Made:

@@ -29,7 +29,8 @@ CONFIG = FloorPlanConfig(
 
 README = f"""\
 A robot drives through an office of 14 m x 10 m: five rooms, a corridor, doors that open, people who walk.
-Its laser has {BEAMS} beams over half a circle and 1.5 cm of noise; one beam in a hundred does not return (81.91).
+Its laser has {BEAMS} beams over half a circle and 1.5 cm of noise; of one beam in a hundred nothing comes
+back (81.91).
 
 format: CARMEN log, lines 'FLASER n r_1 ... r_n x y theta odom_x odom_y odom_theta time host time'
 true:   x y theta of every line is the laser's true pose; odom_* is what noisy wheels say.

@@ -12,12 +12,13 @@ from vslam_ref.datasets import mrclam, noise
 from vslam_ref.systems.slam_log import simulated
 from vslam_ref.worlds.figure_eight import EightConfig, drive, scatter
 
-SECONDS = 100.0
+SECONDS = 120.0
 LANDMARKS = 15
 """As many as MRCLAM has."""
 
 README = f"""\
-A robot drives eights for {SECONDS:g} s among {LANDMARKS} landmarks and sees those ahead of it: range and bearing.
+A robot drives eights for {SECONDS:g} s among {LANDMARKS} landmarks and sees those ahead of it, by range and
+bearing.
 
 format: MRCLAM (UTIAS multi-robot localisation and mapping), one robot; each file names its columns
 true:   Robot1_Groundtruth.dat and Landmark_Groundtruth.dat, exact; truth.json has gains, offsets, delay and
