@@ -53,7 +53,7 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
         "wheels_end_off_m": float(np.hypot(*(wheels[-1] - recording.poses[-1])[:2])),
     }
     command = "vslam-ref grid samples/laser/office.log --out out/office"
-    return Made(README, (command, f"{command} --set map.no_return=free"), known)
+    return Made(README, (command, f"{command} --resolution 0.05 --set video_frames=0"), known)
 
 
 def _people(recording: Recording) -> list[list[float]]:
