@@ -34,6 +34,7 @@ from vslam_ref.commands import (
     grid,
     identify,
     reproduce,
+    sample,
     vectors,
     verify,
     warm_cache,
@@ -44,6 +45,7 @@ from vslam_ref.commands import run as run_command
 PROGRAM = "vslam-ref"
 COMMANDS: dict[str, ModuleType] = {
     "list": list_command,
+    "sample": sample,
     "reproduce": reproduce,
     "run": run_command,
     "evaluate": evaluate,
@@ -85,7 +87,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=PROGRAM,
         description=DESCRIPTION,
-        epilog="example: vslam-ref reproduce iekf-fig2 --quick",
+        epilog="examples:\n  vslam-ref sample all --out samples\n  vslam-ref reproduce iekf-fig2 --quick",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {vslam_ref.__version__}")

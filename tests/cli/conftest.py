@@ -9,9 +9,19 @@ from typing import Any
 
 import pytest
 
+from vslam_ref.cli import main
+
 HERE = str(Path(__file__).resolve().parents[1] / "experiments")
 if HERE not in sys.path:
     sys.path.insert(0, HERE)
+
+
+@pytest.fixture(scope="session")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a sample of every kind, seed 1: it stands in for data sets.  Not to be written to."""
+    folder = tmp_path_factory.mktemp("made") / "samples"
+    assert main(["sample", "all", "--out", str(folder)]) == 0
+    return folder
 
 
 @pytest.fixture

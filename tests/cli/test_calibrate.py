@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vslam_ref import cli
+from vslam_ref import _kernels, cli
 from vslam_ref.commands import calibrate as command
 from vslam_ref.datasets import checkerboard, pictures
 from vslam_ref.datasets.calibration_files import read_opencv
@@ -65,6 +65,7 @@ def test_printed_written_and_computed_numbers_are_the_same(
     assert run(folder, "--board", "6x4", "--square", "0.05", "--json", target, "--out", out) == 0
     shown = capsys.readouterr().out
     numbers = json.loads(target.read_text())
+    assert numbers.pop("versions")["backend"] == _kernels.backend()
     assert list(numbers) == KEYS
     assert (numbers["images"], numbers["used"]) == (9, 8)
     assert numbers["skipped"] == [str(folder / "wall.png")]

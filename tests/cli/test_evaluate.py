@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vslam_ref import cli
+from vslam_ref import _kernels, cli
 from vslam_ref.commands import evaluate as command
 from vslam_ref.datasets import catalogue, trajectories
 from vslam_ref.metrics.trajectory import MODES, Trajectory, evaluate
@@ -53,6 +53,7 @@ def test_printed_written_and_computed_numbers_are_the_same(
     target = tmp_path / "numbers.json"
     assert run(*files, "--align", mode, "--json", target) == 0
     numbers = json.loads(target.read_text())
+    assert numbers.pop("versions")["backend"] == _kernels.backend()
     assert list(numbers) == KEYS
     estimate, truth = (trajectories.read(f).trajectory for f in files)
     assert numbers == evaluate(estimate, truth, mode).numbers()

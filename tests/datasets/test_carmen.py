@@ -146,3 +146,20 @@ def test_other_directions_of_the_beams_blur_real_maps(name: str) -> None:
         L = grid.occupied().log_odds
         blur[way] = float(entropy_bits(L[L != 0]).sum())
     assert blur["taken"] < 0.97 * min(blur["closed"], blur["centred"])
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    """To the last bit; nothing came back where a range is not finite."""
+    rng = np.random.default_rng(0)
+    poses, wheels, times = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), np.array([0.1, 0.2, 0.35])
+    ranges = rng.uniform(0.1, 9.0, (3, 181))
+    ranges[0, 5], ranges[2, 7] = np.inf, np.nan
+    carmen.write(tmp_path / "a.log", poses, wheels, ranges, times)
+    log = carmen.read(tmp_path / "a.log")
+    wanted = np.where(np.isfinite(ranges), ranges, 81.91)
+    np.testing.assert_array_equal(log.ranges, wanted)
+    assert (log.ranges >= log.scanner.max_range).sum() == 2
+    np.testing.assert_array_equal(log.poses, poses)
+    np.testing.assert_array_equal(log.times, times)
+    words = (tmp_path / "a.log").read_text().splitlines()[1].split()
+    assert [float(word) for word in words[-6:-3]] == wheels[0].tolist()

@@ -52,6 +52,25 @@ def run(*words: object) -> int:
     return cli.main(["grid", *map(str, words)])
 
 
+def test_beams_without_return_that_clear_the_way_stay_in_the_map(tmp_path: Path) -> None:
+    """Beams into the open reach farther than any wall of the log: the map must have room for them.
+
+    Ten beams, a degree apart and nearly upright, share no cell of 0.1 m beyond 6 m, and end at 30 m.
+    """
+    path = room(tmp_path / "a.log", scans=3)
+    words = [line.split() for line in path.read_text().splitlines()]
+    for line in words:
+        line[2 + 170 : 2 + 180] = ["81.91"] * 10
+    path.write_text("\n".join(" ".join(line) for line in words) + "\n")
+    more = ["--set", "video_frames=0", "--set"]
+    assert run(path, "--out", tmp_path / "free", *more, "map.no_return=free") == 0
+    assert run(path, "--out", tmp_path / "ignored", *more, "map.no_return=ignore") == 0
+    cells = [
+        json.loads((tmp_path / name / "result.json").read_text())["cells"] for name in ("free", "ignored")
+    ]
+    assert cells[0] - cells[1] > 10 * (30 - 6) / 0.1
+
+
 def test_a_run_writes_its_maps_film_numbers_and_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from vslam_ref.chapters import CHAPTERS
+
 ROOT = Path(__file__).resolve().parents[2]
 BINARY = {".png", ".jpg", ".npz", ".gz", ".bz2", ".pdf", ".woff2"}
 
@@ -76,17 +78,18 @@ def test_the_make_targets_of_the_texts_exist() -> None:
     assert {"reproduce", "test", "lint", "notebooks", "docs", "bench", "clean"} <= targets
 
 
-def test_the_chapter_table_of_the_readme_is_the_books() -> None:
-    sys.path.insert(0, str(ROOT / "docs" / "_tools"))
-    try:
-        import book
-    finally:
-        sys.path.pop(0)
+def test_the_chapter_table_of_the_readme_is_the_packages() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\d\d) \| ([^|]+) \| `([^`]+)` \| (\w+) \|$", text, re.MULTILINE)
     told = [(int(number), title.strip(), room, state) for number, title, room, state in rows]
-    wanted = [(c.number, c.title, c.room, "here" if c.has_code else "planned") for c in book.CHAPTERS]
-    assert told == wanted
+    assert told == [(c.number, c.title, c.room, c.state) for c in CHAPTERS]
+
+
+def test_the_pages_of_the_chapter_table_are_those_that_there_are() -> None:
+    pages = sorted(path.stem for path in (ROOT / "docs" / "chapters").glob("[0-9][0-9]_*.md"))
+    assert [c.page for c in CHAPTERS if c.page] == pages
+    assert all(c.page.startswith(f"{c.number:02d}_") and c.has_code for c in CHAPTERS if c.page)
+    assert [c.number for c in CHAPTERS] == list(range(1, 25))
 
 
 def test_the_licences_and_the_version_agree() -> None:

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, add_set, file_target, json_target, warm, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.bundle_files import BundleFile
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 HELP = "adjust a bundle: cameras and points from their images"
 EPILOG = """\
-formats (told from the content): BAL text, plain or with .gz or .bz2; libmv .bin; Bundler bundle.out; a folder
+formats (seen from the content): BAL text, plain or with .gz or .bz2; libmv .bin; Bundler bundle.out; a folder
 with COLMAP's cameras.txt, images.txt, points3D.txt
 
 losses: l2 (least squares, the default), huber, cauchy, geman-mcclure, tukey. A robust loss needs the size of
@@ -24,10 +24,12 @@ an honest error: pixels, or 'adaptive', from the median of the errors after ever
 Poses and points move; of the intrinsics those that the format says, or those that --free names (f is one
 focal length for both axes, 'none' is none). Nothing is written where there is nothing to adjust.
 
-examples:
-  vslam-ref ba problem-16-22106-pre.txt.bz2 --json result.json --ply scene.ply
-  vslam-ref ba problem_01.bin --free f --loss tukey --scale 1.5
-  vslam-ref ba sparse/ --out adjusted/ --set cost=1e-10 --set max_iterations=200"""
+examples, after 'vslam-ref sample bal colmap --out samples':
+  vslam-ref ba samples/bal/problem.txt --json result.json --ply scene.ply
+  vslam-ref ba samples/bal/problem.txt --free f --loss tukey --scale 1.5
+  vslam-ref ba samples/colmap/model --out adjusted --set cost=1e-10 --set max_iterations=200
+and with a known data set:
+  vslam-ref ba problem-16-22106-pre.txt.bz2"""
 
 LOSSES = ("l2", "huber", "cauchy", "geman-mcclure", "tukey")
 BACKENDS = ("auto", "numpy", "numba")
@@ -61,25 +63,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="FILE", help="write the result: BAL (.txt, .gz, .bz2) or a COLMAP folder"
     )
     parser.add_argument("--ply", metavar="FILE", help="write points and cameras for a viewer")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="cost, gradient, scale, max_iterations, damping, method; may be repeated",
-    )
+    add_set(parser, "cost, gradient, scale, max_iterations, damping, method")
     add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, adjust, print the numbers and write what was asked for."""
     from vslam_ref import _kernels
-    from vslam_ref.datasets.bundle_files import read_bundle
+    from vslam_ref.datasets.bundle_files import read_bundle, write_bundle, write_ply
     from vslam_ref.estimation.bundle import Options, bundle_adjust
     from vslam_ref.estimation.bundle.diagnosis import diagnose
     from vslam_ref.support.config import apply_overrides
 
-    targets = _targets(options)
+    target, ply, out = json_target(options), file_target(options.ply), file_target(options.out)
     settings = apply_overrides(Options(), options.set)
     robust = _robust(options.loss, options.scale)
     file = read_bundle(Path(options.file))
@@ -89,8 +85,7 @@ def run(options: argparse.Namespace) -> int:
     for note in [*file.notes, *diagnose(problem).sentences()]:
         print(f"note: {note}")
     with _kernels.use_backend(options.backend) as backend:
-        if backend == "numba":
-            _kernels.warm("bundle", "bundle_schur")  # compiling is no part of the time
+        warm("bundle", "bundle_schur")  # compiling is no part of the time
         wall, cpu = time.perf_counter(), time.process_time()
         result = bundle_adjust(problem, robust, settings, _Table())
         seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
@@ -98,37 +93,13 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"{options.file} {HOPELESS[result.reason]}: nothing was adjusted, nothing written")
     numbers = _numbers(result) | {"seconds": seconds, "cpu_seconds": cpu_seconds, "backend": backend}
     _show(numbers, result)
-    _write(targets, file, result)
-    write_json(targets["json"], {key: numbers[key] for key in KEYS})
+    after = file.at(result.problem.scene)
+    if ply is not None:
+        write_ply(ply, after)
+    if out is not None:
+        write_bundle(out, after)
+    write_json(target, numbers)
     return 0
-
-
-KEYS = (
-    "cameras",
-    "points",
-    "observations",
-    "initial_cost",
-    "final_cost",
-    "iterations",
-    "seconds",
-    "cpu_seconds",
-    "backend",
-    "reason",
-    "rmse_px",
-    "sigma",
-    "set_aside",
-)
-
-
-def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
-    """Checked paths of all outputs, before any work."""
-    from vslam_ref.support import files
-
-    targets = {"json": json_target(options)}
-    for name in ("out", "ply"):
-        given = getattr(options, name)
-        targets[name] = None if given is None else files.require_parent(given)
-    return targets
 
 
 def _robust(name: str, scale: str | None) -> Robust:
@@ -214,15 +185,3 @@ def _show(numbers: dict[str, Any], result: BundleResult) -> None:
     if result.aside.any():
         rows.append(["observations set aside", f"{numbers['set_aside']} without an image at the start"])
     print(table(["what", "value"], rows))
-
-
-def _write(targets: dict[str, Path | None], file: BundleFile, result: BundleResult) -> None:
-    from dataclasses import replace
-
-    from vslam_ref.datasets.bundle_files import write_bundle, write_ply
-
-    after = replace(file, problem=result.problem)
-    if targets["ply"] is not None:
-        write_ply(targets["ply"], after)
-    if targets["out"] is not None:
-        write_bundle(targets["out"], after)

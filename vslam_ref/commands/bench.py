@@ -7,10 +7,10 @@ import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, json_target, print_backend, write_json
 
 HELP = "time the library on this machine, against the peers that are installed"
-EPILOG = "example: vslam-ref bench filters --quick --json bench.json"
+EPILOG = "example: vslam-ref bench --quick --json bench.json"
 
 SUITES = {
     "filters": "vslam_ref.bench.filters",
@@ -42,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"measuring {name} ...", file=sys.stderr, flush=True)
         results[name] = importlib.import_module(SUITES[name]).run(quick=options.quick)
         print(f"{name}\n{report(results[name])}", flush=True)
+    print_backend()
     write_json(target, results)
     return 0
 

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.arrays import Array
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 HELP = "calibrate a camera from images of a checkerboard"
 EPILOG = """\
-The board is told by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners; images in
+The board is given by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners; images in
 which the whole board is not seen are named and left out. Take 10 or more images, with the board tilted by 30
 to 45 degrees in different directions, near and far, and into all corners of the image.
 
@@ -28,10 +28,12 @@ models:
 
 Nothing is written, and the status is 2, where the images do not determine the camera.
 
-examples:
-  vslam-ref calibrate left*.jpg --board 9x6 --model radtan --out camera.yaml
-  vslam-ref calibrate images/ --board 9x6 --model fov --square 0.025 --json calibration.json
-  vslam-ref calibrate images/ --board 9x6 --fix k3=0 --aspect 1 --loss tukey"""
+examples, after 'vslam-ref sample boards --out samples':
+  vslam-ref calibrate samples/boards/radtan --board 9x6 --out camera.yaml
+  vslam-ref calibrate samples/boards/fov --board 9x6 --model fov --square 0.025 --json calibration.json
+  vslam-ref calibrate samples/boards/radtan --board 9x6 --fix k3=0 --aspect 1 --loss tukey
+and with your own pictures:
+  vslam-ref calibrate left*.jpg --board 9x6"""
 
 LOSSES = ("l2", "huber", "tukey")
 MODELS = ("radtan", "fov", "fisheye", "pinhole", "rational")
@@ -75,12 +77,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the corners, calibrate, print the numbers and write what was asked for."""
+    from vslam_ref.datasets.calibration_files import CameraFile, write_opencv
     from vslam_ref.datasets.pictures import image_files
     from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly
-    from vslam_ref.support import files
 
     target = json_target(options)
-    out = files.require_parent(options.out) if options.out is not None else None
+    out = file_target(options.out)
     board = Board.from_text(options.board, options.square)
     fixed = _fixed(options.fix)
     began = time.perf_counter()
@@ -96,7 +98,8 @@ def run(options: argparse.Namespace) -> int:
     numbers = _numbers(options.model, found, result, seconds)
     _show(numbers, found, result)
     if out is not None:
-        _write(out, result, found.size)
+        write_opencv(out, CameraFile(result.camera, found.size))
+        print(f"camera written to {out}")
     write_json(target, numbers)
     return 0
 
@@ -209,10 +212,4 @@ def _show(numbers: dict[str, Any], found: Found, result: Calibration) -> None:
     ignored = int((result.weights == 0.0).sum())
     if ignored:
         print(f"{ignored} corners are so far off that they weigh nothing")
-
-
-def _write(path: Path, result: Calibration, size: tuple[int, int]) -> None:
-    from vslam_ref.datasets.calibration_files import CameraFile, write_opencv
-
-    write_opencv(path, CameraFile(result.camera, size))
-    print(f"camera written to {path}")
+    print_backend()

@@ -11,7 +11,7 @@ HELP = "show the known data sets: what they are, where they were found, where to
 EPILOG = """\
 VSLAM_REF_DATA holds the folders to search, separated like PATH. A set is found in a folder of its name.
 
-example: VSLAM_REF_DATA=~/slam-data vslam-ref data victoria_park"""
+example, with data sets in ~/slam-data: VSLAM_REF_DATA=~/slam-data vslam-ref data victoria_park"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

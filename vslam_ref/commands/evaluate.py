@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.trajectories import TrajectoryFile
@@ -24,9 +24,11 @@ times, line by line. The relative error (RPE) is that of the step from each pair
 
 formats: tum (t tx ty tz qx qy qz qw), kitti (12 numbers), euroc (ns,tx,ty,tz,qw,qx,qy,qz); '.gz' is unpacked
 
-examples:
-  vslam-ref evaluate estimate.txt groundtruth.txt --json errors.json
-  vslam-ref evaluate keyframes.txt groundtruth.txt --align sim3 --plot errors.svg"""
+examples, after 'vslam-ref sample trajectory --out samples':
+  vslam-ref evaluate samples/trajectory/estimate.txt samples/trajectory/groundtruth.txt --json errors.json
+  vslam-ref evaluate samples/trajectory/estimate.txt samples/trajectory/groundtruth.txt --plot errors.svg
+and with your own:
+  vslam-ref evaluate keyframes.txt groundtruth.txt --align sim3"""
 
 ALIGNMENTS = ("none", "se3", "sim3")
 FORMATS = ("tum", "kitti", "euroc")
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--align", choices=ALIGNMENTS, default="se3", help="what the alignment may change (default: se3)"
     )
     parser.add_argument(
-        "--format", choices=FORMATS, help="format of both files (default: told from the text)"
+        "--format", choices=FORMATS, help="format of both files (default: seen from the text)"
     )
     parser.add_argument("--plot", metavar="FILE", help="draw both paths and the error over time (.png, .svg)")
     add_json(parser)
@@ -61,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read both files, print the numbers and write what was asked for."""
     target = json_target(options)
-    plot = _plot_target(options)
+    plot = file_target(options.plot, PLOTS)
 
     from vslam_ref.commands.tables import table
     from vslam_ref.datasets import trajectories
@@ -77,23 +79,11 @@ def run(options: argparse.Namespace) -> int:
     print(table(["what", "value", "unit"], rows))
     for note in _notes(found, (options.estimate, estimate), (options.truth, truth)):
         print(f"note: {note}")
+    print_backend()
     if plot is not None:
         _draw(plot, found, Path(options.estimate).name, options.align)
     write_json(target, numbers)
     return 0
-
-
-def _plot_target(options: argparse.Namespace) -> Path | None:
-    """Return the checked path of ``--plot``, before any work."""
-    if options.plot is None:
-        return None
-    from vslam_ref.support import files
-    from vslam_ref.support.errors import InputError
-
-    path = Path(options.plot)
-    if path.suffix not in PLOTS:
-        raise InputError(f"--plot {options.plot!r}: the name must end in {' or '.join(PLOTS)}")
-    return files.require_parent(path)
 
 
 def _notes(found: Evaluation, *read: tuple[str, TrajectoryFile]) -> list[str]:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, json_target, print_backend, warm, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,9 +28,12 @@ and the time that the two maps took.
 
 '--set map.settle_seconds=none' and '--set map.explained_by=0' give the table of the book as it is printed.
 
-examples:
+examples, after 'vslam-ref sample laser --out samples':
+  vslam-ref grid samples/laser/office.log --out out/office
+  vslam-ref grid samples/laser/office.log --out out/fine --resolution 0.05 --json fine.json
+and with known data sets:
   vslam-ref grid intel --out out/intel
-  vslam-ref grid freiburg-079-corrected.log.gz --out out/fr079 --resolution 0.05 --json fr079.json"""
+  vslam-ref grid freiburg-079-corrected.log.gz --out out/fr079"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,21 +57,22 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.datasets import carmen
     from vslam_ref.experiments.grid_log import report
     from vslam_ref.experiments.grid_log.mapping import GridConfig
-    from vslam_ref.experiments.slam_log.report import check_out
     from vslam_ref.support import files
     from vslam_ref.support.config import apply_overrides, config_to_dict
     from vslam_ref.support.provenance import versions
 
-    out = check_out(options.out)
+    out = files.require_new_folder(options.out, "result.json")
     given = [] if options.resolution is None else [f"map.resolution={options.resolution!r}"]
     config = apply_overrides(GridConfig(), [*given, *options.set])
     log = carmen.read(find_log(options.log))
+    warm("grids")
     with files.new_folder(out) as folder:
         mapped = draw(log, config, folder)
         content: dict[str, Any] = mapped.numbers()
         content |= {"config": config_to_dict(config), "versions": versions()}
         report.write_report(folder, mapped, content)
     print(table(["what", "value", "unit"], report.number_rows(content)))
+    print_backend()
     print(f"page: {out / 'report.html'}")
     write_json(target, content)
     return 0

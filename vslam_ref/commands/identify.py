@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, json_target, warm, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.systems.slam_log import SlamLog
@@ -16,7 +17,7 @@ data sets: mrclam (all robots together) and victoria_park, found through VSLAM_R
 Takes minutes: every value is moved until the innovations of EKF and IEKF are most likely.
 Without --json the document is printed.
 
-example: vslam-ref identify mrclam --json mrclam.json"""
+example, with a known data set: vslam-ref identify mrclam --json mrclam.json"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +37,7 @@ def run(options: argparse.Namespace) -> int:
         known = sorted(identify.FREE)
         raise InputError(f"unknown data set {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
     target = json_target(options)
+    print(f"backend: {warm('slam', 'reduced')}", file=sys.stderr)  # stdout may be the document
     found = identify.identify(read_logs(name), identify.START[name], identify.FREE[name])
     document = {"dataset": name, "command": f"vslam-ref identify {name}", **found}
     if target is None:

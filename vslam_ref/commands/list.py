@@ -10,13 +10,6 @@ from vslam_ref.commands.options import add_json, json_target, write_json
 HELP = "show the chapters, experiments and filters, and the data sets found"
 EPILOG = "example: vslam-ref list --json list.json"
 
-CHAPTERS = (
-    (15, "Ackermann EKF-SLAM", "vslam_ref.filters.ekf_slam"),
-    (16, "IEKF-SLAM: the improved EKF, a second-order Carleman lift", "vslam_ref.filters.carleman_ekf"),
-    (17, "Consistency: NEES Monte Carlo", "vslam_ref.metrics.consistency"),
-)
-"""Number, title and module of every chapter whose code is here; the book's numbers are fixed."""
-
 FILTERS = (
     ("ekf", "EKF-SLAM with the covariance in blocks", "vslam_ref.filters.ekf_slam"),
     ("ekf-anchored", "EKF started at zero covariance in its own frame", "vslam_ref.filters.ekf_slam"),
@@ -37,7 +30,8 @@ def run(options: argparse.Namespace) -> int:
 
     target = json_target(options)
     content = contents()
-    print("Chapters\n" + table(["no", "title", "module"], [[str(c) for c in row] for row in CHAPTERS]))
+    rows = [[f"{c['number']:02d}", c["title"], c["module"], c["state"]] for c in content["chapters"]]
+    print("Chapters (docs/chapters/, notebooks/)\n" + table(["no", "title", "module", "state"], rows))
     rows = [[e["id"], e["title"], e["source"]] for e in content["experiments"]]
     print("\nExperiments (vslam-ref reproduce ID)\n" + table(["id", "title", "source"], rows))
     print("\nFilters\n" + table(["name", "what", "module"], [list(row) for row in FILTERS]))
@@ -53,13 +47,17 @@ def run(options: argparse.Namespace) -> int:
 
 def contents() -> dict[str, Any]:
     """Return all lists as plain data."""
+    from vslam_ref.chapters import CHAPTERS
     from vslam_ref.datasets.catalogue import find
     from vslam_ref.datasets.known import DATA_SETS
     from vslam_ref.experiments.framework.registry import summaries
 
     folders = {data_set.name: find(data_set.name) for data_set in DATA_SETS}
     return {
-        "chapters": [{"number": n, "title": title, "module": module} for n, title, module in CHAPTERS],
+        "chapters": [
+            {"number": c.number, "title": c.title, "module": c.module, "state": c.state, "page": c.page}
+            for c in CHAPTERS
+        ],
         "experiments": [summary._asdict() for summary in summaries()],
         "filters": [{"name": name, "what": what, "module": module} for name, what, module in FILTERS],
         "data_sets_found": {name: str(folder) for name, folder in folders.items() if folder},

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from vslam_ref.commands.options import add_json, at_least, json_target, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    add_set,
+    at_least,
+    folder_target,
+    json_target,
+    print_backend,
+    warm,
+    write_json,
+)
 
 HELP = "run a system over recorded data and compare it with the truth"
 EPILOG = """\
@@ -17,9 +25,12 @@ data sets: mrclam (--robot N) and victoria_park, found through VSLAM_REF_DATA, o
 Gains and noises are those identified without truth; '--set calibration.sigma_range=0.05' changes one,
 '--set run.gate=9' a setting of the run.
 
-examples:
+examples, after 'vslam-ref sample robot --out samples':
+  vslam-ref run iekf-slam samples/robot --out out/robot
+  vslam-ref run ekf-slam samples/robot --no-batch --set calibration.turn_gain=1 --json robot.json
+and with known data sets:
   vslam-ref run ekf-slam mrclam --robot 3 --out out/robot3
-  vslam-ref run iekf-slam victoria_park --out out/park --json park.json"""
+  vslam-ref run iekf-slam victoria_park --out out/park"""
 
 SYSTEMS = {"ekf-slam": "ekf", "iekf-slam": "iekf"}
 """System -> the filter whose numbers stand on top of the JSON."""
@@ -32,9 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", type=at_least(1), metavar="N", help="robot of an MRCLAM set (default: 1)")
     parser.add_argument("--out", metavar="DIR", help="write figures, trajectories, maps and a page there")
     parser.add_argument("--no-batch", action="store_true", help="leave the batch solution out")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting; may be repeated"
-    )
+    add_set(parser)
     add_json(parser)
 
 
@@ -48,9 +57,10 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.support.provenance import versions
 
     target = json_target(options)
-    out = _out(options)
-    began = time.perf_counter()
+    out = folder_target(options.out)
     source = logs.open_source(options.dataset, options.robot)
+    warm("slam", "reduced")
+    began = time.perf_counter()
     config = apply_overrides(logs.default_config(source.dataset), options.set)
     comparison = logs.compare(source, config, batch=not options.no_batch)
     content = logs.document(comparison, SYSTEMS[options.system])
@@ -62,17 +72,9 @@ def run(options: argparse.Namespace) -> int:
     seen, truth = content["sightings"], content["truth"] or "none"
     print(f"{source.log.name}: {seen} sightings of landmarks, truth: {truth}")
     print(table(heads, rows))
+    print_backend()
     if out is not None:
         report.write_report(out, comparison, content)
         print(f"page: {out / 'report.html'}")
     write_json(target, content)
     return 0
-
-
-def _out(options: argparse.Namespace) -> Path | None:
-    """Return the checked output folder, before any work."""
-    if options.out is None:
-        return None
-    from vslam_ref.experiments.slam_log.report import check_out
-
-    return check_out(options.out)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, json_target, write_json
+from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
 
 if TYPE_CHECKING:
     from vslam_ref.conformance.nees_runs import Judgement
@@ -29,8 +29,9 @@ run, step, e1..ed, P11..Pdd (row by row), or an .npz with the arrays run, step, 
 
 Status: 0 all answered cases pass, 1 some fail, 2 bad use.
 
-examples:
-  vslam-ref verify --program "./my_slam_adapter" --report report.html
+examples, the first after 'vslam-ref sample adapter --out samples':
+  vslam-ref verify --program "python samples/adapter/my_slam_adapter.py" \\
+      --convention samples/adapter/convention.json
   vslam-ref verify --module my_package.adapter --chapter 2 --convention mine.json
   vslam-ref verify --self
   vslam-ref verify --nees runs.csv --dof 3"""
@@ -60,10 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, judge, print, and write what was asked for."""
-    from vslam_ref.support import files
-
     target = json_target(options)
-    page = files.require_parent(options.report) if options.report is not None else None
+    page = file_target(options.report)
     if options.nees is not None:
         return _nees(options, target, page)
     if not 0 < options.timeout < float("inf"):
@@ -78,8 +77,11 @@ def run(options: argparse.Namespace) -> int:
     finally:
         asked.close()
     _show(report)
+    if options.self:
+        print_backend()
     if page is not None:
         from vslam_ref.conformance.report import page as html
+        from vslam_ref.support import files
 
         files.write_text(page, html(report))
     write_json(target, report.numbers())

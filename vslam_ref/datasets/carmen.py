@@ -1,4 +1,4 @@
-"""Reader of laser logs in CARMEN's text format, plain or gzipped.
+"""Reader and writer of laser logs in CARMEN's text format, plain or gzipped.
 
 One message a line, its name first; ``#`` begins a comment.  Read are the scans of the front laser::
 
@@ -31,9 +31,12 @@ import numpy as np
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.text import MAX_BYTES, FormatError, is_number, number, read_lines
 from vslam_ref.grids.scan import LaserScanner, Scan
+from vslam_ref.support.files import write_text
 
 SCAN = "FLASER"
 MAX_RANGE = 50.0
+NO_RETURN = 81.91
+"""Metres; what is written for a beam that nothing came back of, as a SICK scanner says it."""
 MAX_BEAMS = 4096
 """More than any scanner of half a circle has; a larger number is a damaged line."""
 TAIL = ("x", "y", "theta", "odom_x", "odom_y", "odom_theta", "ipc_time", "host", "logger_time")
@@ -155,3 +158,25 @@ def _readings(path: Path, line: int, words: list[str]) -> Array:
     except ValueError:
         k, word = next((k, word) for k, word in enumerate(words, 1) if not is_number(word))
         raise FormatError(path, line, f"reading {k} is {word!r}; expected a number") from None
+
+
+def write(path: Path, poses: Array, odometry: Array, ranges: Array, times: Array) -> None:
+    """Write a log of a front laser, every number in full.
+
+    Parameters
+    ----------
+    path : Path
+    poses, odometry : ndarray, shapes (N, 3)
+        (x, y, theta) of the laser in the world, and what the wheels say of the robot.
+    ranges : ndarray, shape (N, B)
+        Metres, at the angles of :func:`scanner` ``(B)``; what is not finite is written as :data:`NO_RETURN`.
+    times : ndarray, shape (N,)
+        Seconds.
+    """
+    beams = ranges.shape[1]
+    readings = np.where(np.isfinite(ranges), ranges, NO_RETURN)
+    lines = [f"# {SCAN} n r_1 ... r_n {' '.join(TAIL)}"]
+    for row, pose, wheels, time in zip(readings, poses, odometry, times.tolist(), strict=True):
+        numbers = " ".join(map(repr, [*row.tolist(), *pose.tolist(), *wheels.tolist(), time]))
+        lines.append(f"{SCAN} {beams} {numbers} simulated {time!r}")
+    write_text(path, "\n".join(lines) + "\n")

@@ -1,4 +1,4 @@
-"""Reader of the UTIAS multi-robot localisation and mapping logs (MRCLAM).
+"""Reader and writer of the UTIAS multi-robot localisation and mapping logs (MRCLAM).
 
 Files of a set, plain text or gzipped, ``#`` begins a comment::
 
@@ -11,13 +11,15 @@ Files of a set, plain text or gzipped, ``#`` begins a comment::
 :func:`read_log` opens the first three only; :func:`read_truth` opens the last two.  Landmark ids are
 subject numbers.  Sightings of other robots are dropped and counted.  A barcode in no line of
 ``Barcodes.dat`` is a misreading; a real log has a few in ten thousand lines, so up to
-``MISREAD_SHARE`` of the lines are dropped and counted, and more are an error.
+``MISREAD_SHARE`` of the lines are dropped and counted, and more are an error.  :func:`write` writes all five
+files, for a simulated robot.
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,10 +33,13 @@ from vslam_ref.datasets.text import (
     require_order,
 )
 from vslam_ref.geometry import so2
+from vslam_ref.support.files import write_text
 from vslam_ref.systems.slam_log.log import Sighting, SlamLog, Truth
 
 ROBOTS = range(1, 6)
 MISREAD_SHARE = 1e-3
+BARCODE = 54
+"""Written barcodes are subject numbers plus this: a reader that mistakes one for the other finds nothing."""
 TRUTH_GAP = 0.25
 """Seconds between two true poses beyond which there is no truth (cameras at 100 Hz lost the robot)."""
 
@@ -176,3 +181,56 @@ def set_folder(root: Path) -> Path:
         names = ", ".join(p.name for p in found) or "none"
         raise FormatError(root, None, f"sets with RobotN_Odometry.dat: {names}; expected one")
     return found[0]
+
+
+def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
+    """Write log and truth of one robot into a folder, every number in full.
+
+    Parameters
+    ----------
+    folder : Path
+        Is there; files of the same names are replaced.
+    robot : int
+        1 to 5.
+    log : SlamLog
+        Of a differential drive.
+    truth : Truth
+        Its landmarks have numbers from 6 on.
+
+    Raises
+    ------
+    ValueError
+        On what the format cannot say: another drive, or a landmark with a robot's number.
+
+    Notes
+    -----
+    Times are written on the data set's clock, so read again they are right to its rounding: 1e-13 s for a
+    clock of a thousand seconds.  What the log's reader left out is not written.
+    """
+    if log.drive != "differential" or robot not in ROBOTS or np.isin(truth.ids, ROBOTS).any():
+        raise ValueError(
+            f"robot {robot}, {log.drive} drive: MRCLAM has robots 1 to 5, wheels, and landmarks from 6"
+        )
+    start = log.clock_start
+    seen = [
+        (start + s.time, BARCODE + int(i), r, b)
+        for s in log.sightings
+        for i, (r, b) in zip(s.ids.tolist(), s.polar.tolist(), strict=True)
+    ]
+    subjects = [*((i, i) for i in ROBOTS), *((i, BARCODE + i) for i in truth.ids.tolist())]
+    marks = [(*row, 0.0, 0.0) for row in _rows(truth.ids, truth.landmarks)]
+    poses = _rows(start + truth.times, truth.poses)
+    tables: dict[str, tuple[str, list[tuple[Any, ...]]]] = {
+        "Barcodes.dat": ("subject barcode", subjects),
+        f"Robot{robot}_Odometry.dat": ("time_s v_m_s omega_rad_s", _rows(start + log.times, log.controls)),
+        f"Robot{robot}_Measurement.dat": ("time_s barcode range_m bearing_rad", seen),
+        f"Robot{robot}_Groundtruth.dat": ("time_s x_m y_m theta_rad", poses),
+        "Landmark_Groundtruth.dat": ("subject x_m y_m sd_x_m sd_y_m", marks),
+    }
+    for name, (head, rows) in tables.items():
+        lines = [f"# {head}", *(" ".join(map(repr, row)) for row in rows)]
+        write_text(folder / name, "\n".join(lines) + "\n")
+
+
+def _rows(first: Array | IntArray, values: Array) -> list[tuple[Any, ...]]:
+    return [(k, *row) for k, row in zip(first.tolist(), values.tolist(), strict=True)]

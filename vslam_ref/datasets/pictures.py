@@ -1,4 +1,4 @@
-"""Pictures from files, as grey values.
+"""Pictures from files, as grey values, and back.
 
 OpenCV decodes them.  What its decoders would write to the terminal is caught, and quoted in the error; sizes
 are read before a picture is unpacked.
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.datasets.picture_size import require_size
 from vslam_ref.datasets.text import FormatError
+from vslam_ref.support.files import write_bytes
 
 GreyImage = NDArray[np.uint8]
 
@@ -86,6 +87,16 @@ def read_grey(path: Path | str) -> GreyImage:
         )
     grey: GreyImage = image.astype(np.uint8, copy=False)
     return grey
+
+
+def write_png(path: Path, grey: GreyImage) -> None:
+    """Write grey values (H, W) as a PNG: every value comes back."""
+    import cv2
+
+    done, data = cv2.imencode(".png", grey)
+    if not done:
+        raise ValueError(f"{path}: an image of shape {grey.shape}, {grey.dtype} cannot be written")
+    write_bytes(path, data.tobytes())
 
 
 @contextmanager

@@ -49,6 +49,30 @@ def require_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
+def require_new_folder(path: str | os.PathLike[str], mark: str) -> Path:
+    """Check that a folder can take the place of ``path``, before long work begins.
+
+    Parameters
+    ----------
+    path : str or path
+        Is new, empty, or holds an earlier result.  Its parent is made.
+    mark : str
+        Name of a file that every result has.
+
+    Raises
+    ------
+    InputError
+        If it is a file, holds other things, or cannot be written.
+    """
+    folder = Path(path)
+    require_folder(folder.parent)
+    if folder.is_file():
+        raise InputError(f"output folder {str(folder)!r} is a file: give a folder")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / mark).is_file():
+        raise InputError(f"output folder {str(folder)!r} holds other things: give a new or empty one")
+    return folder
+
+
 def require_parent(path: str | os.PathLike[str]) -> Path:
     """Check that a file can be written at ``path``, before long work begins.
 

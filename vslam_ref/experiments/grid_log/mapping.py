@@ -92,8 +92,10 @@ class Mapped(NamedTuple):
         }
 
 
-def bounds(log: CarmenLog, usable_range: float, resolution: float) -> Array:
+def bounds(log: CarmenLog, usable_range: float, resolution: float, no_return: str = "ignore") -> Array:
     """World points (2, 2), lower and upper, between which all that a log says lies.
+
+    With ``no_return="free"`` beams that met nothing say something, too: up to ``usable_range``.
 
     Raises
     ------
@@ -102,7 +104,7 @@ def bounds(log: CarmenLog, usable_range: float, resolution: float) -> Array:
     """
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for pose, ranges in zip(log.poses, log.ranges, strict=True):
-        used = (ranges > 0) & (ranges < log.scanner.max_range)
+        used = (ranges > 0) & ((ranges < log.scanner.max_range) | (no_return == "free"))
         angles = pose[2] + log.scanner.angles[used]
         length = np.minimum(ranges[used], usable_range)[:, None]
         ends = pose[:2] + length * np.stack([np.cos(angles), np.sin(angles)], 1)
@@ -136,7 +138,7 @@ def map_log(
         Is told the number of scans so far.
     """
     grid, plain, tracker = StaticDynamicMap(config.map), PlainMap(config.map), Tracker(config.tracks)
-    corners = bounds(log, config.map.usable_range, config.map.resolution)
+    corners = bounds(log, config.map.usable_range, config.map.resolution, config.map.no_return)
     for each in (grid, plain):
         each.reserve(corners)
     low, high = grid.lattice.cells_from_world(corners).tolist()

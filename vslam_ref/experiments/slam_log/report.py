@@ -25,7 +25,6 @@ from vslam_ref.geometry import se2, so2
 from vslam_ref.plot.saving import save_figure
 from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
 from vslam_ref.support import files
-from vslam_ref.support.errors import InputError
 from vslam_ref.support.json_text import to_json
 from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
 from vslam_ref.systems.slam_log.evaluate import reference_point
@@ -43,17 +42,6 @@ WORDS = {
     "nees_mean": "mean NEES (3 is consistent)",
     "rejected": "rejected sightings",
 }
-
-
-def check_out(out: str) -> Path:
-    """Return the output folder if it can be made, is empty, or holds an earlier result; else InputError."""
-    path = Path(out)
-    files.require_folder(path.parent)
-    if path.is_file():
-        raise InputError(f"output folder {out!r} is a file: give a folder")
-    if path.is_dir() and any(path.iterdir()) and not (path / "result.json").is_file():
-        raise InputError(f"output folder {out!r} holds other things: give a new or empty one")
-    return path
 
 
 def write_report(out: Path, comparison: Comparison, content: Mapping[str, Any]) -> None:

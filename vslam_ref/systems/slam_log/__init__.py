@@ -7,6 +7,7 @@ module                        holds
 ``calibration``               gains, delays and noises of vehicle and sensor
 ``timeline``                  the log cut into the steps of a filter
 ``runner``                    a filter over a log, with a gate that sees the innovation and S only
+``simulated``                 what a robot would have logged in a world with exact truth
 ``evaluate``                  errors with and without alignment, NEES
 ============================  =====================================================================
 """
