@@ -14,11 +14,10 @@ module              holds
 ``robustly``        the same with a robust loss, for corners some of which are wrong
 ``result``          what comes back; covariance; what the corners do not determine
 ``ptam``            the step of PTAM's calibrator, as it was
-``simulated``       boards in front of a known camera
 ==================  ==========================================================================
 """
 
-from vslam_ref.estimation.calibration import ptam, simulated
+from vslam_ref.estimation.calibration import ptam
 from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
 from vslam_ref.estimation.calibration.homography import apply_homography, homography
@@ -51,7 +50,6 @@ __all__ = [
     "ptam",
     "reduce",
     "sensor_from_homographies",
-    "simulated",
     "stack",
     "tilt",
 ]

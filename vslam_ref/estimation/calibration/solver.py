@@ -86,12 +86,14 @@ def calibrate(
 
     Examples
     --------
-    >>> from vslam_ref.estimation.calibration import Board, simulated
+    >>> from vslam_ref.estimation.calibration import Board
+    >>> from vslam_ref.geometry import se3
     >>> from vslam_ref.geometry.cameras import Radtan
     >>> truth = Radtan(fx=500, fy=505, cx=322, cy=238, k1=-0.2, k2=0.05, p1=1e-3, p2=-5e-4)
     >>> board = Board(9, 6, 0.03)
-    >>> T = simulated.poses(board, truth, (640, 480), 8, np.random.default_rng(0))
-    >>> found = calibrate(simulated.views(board, truth, T), (640, 480))
+    >>> turns = [[0.4, 0, 0], [-0.5, 0, 0.1], [0, 0.5, 0], [0, -0.4, 0], [0.3, 0.4, 0], [-0.3, 0.3, 0.2]]
+    >>> T = se3.exp([[-0.1, -0.08, 0.4, *turn] for turn in turns])
+    >>> found = calibrate([(board.points, truth.pixel_from_world(P, board.points).uv) for P in T], (640, 480))
     >>> found.converged, bool(np.abs(found.camera.params - truth.params).max() < 1e-6)
     (True, True)
     """
