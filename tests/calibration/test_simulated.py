@@ -92,7 +92,7 @@ def test_covariance_is_honest() -> None:
     assert low < total < high
     # the mistake, poses taken as known, is far outside: the true deviations are several times larger
     problem = Problem(stack(boards.views(BOARD, camera, T)), Free(Radtan), L2())
-    point = problem.at(State(camera.params, T))
+    point = problem.linearise(State(camera.params, T))
     assert point is not None
     naive = 0.3 * np.sqrt(np.diag(np.linalg.inv(point.normal.C)))
     assert found.std["cx"] > 3 * naive[2]
@@ -161,12 +161,12 @@ def test_ptams_step_leaves_nine_tenths() -> None:
     problem = Problem(stack(views), Free(Fov), L2())
     near = se3.perturb(best.T_cam_board, 1e-3 * np.ones(6))
     state = State(best.camera.params + [2.0, 2.0, 1.0, -1.0, 0.01], near)
-    point = problem.at(state)
+    point = problem.linearise(state)
     assert point is not None
     least = 0.5 * float((best.residual**2).sum())
     gaps = [point.cost - least]
     for _ in range(40):
-        point = problem.at(ptam.ptam_step(problem, point, SIZE))
+        point = problem.linearise(ptam.ptam_step(problem, point, SIZE))
         assert point is not None
         gaps.append(point.cost - least)
     ratios = np.array(gaps[1:]) / gaps[:-1]

@@ -27,7 +27,6 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.least_squares.linear import column_lengths
 
 Scaling = Literal["largest", "columns", "none"]
 
@@ -46,11 +45,11 @@ class Damping(Protocol):
     def downhill_only(self) -> bool:
         """Whether a step that does not decrease the cost is refused."""
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
-        """Diagonal of D, (n,), > 0; ``before`` is that of the step before, None at the start."""
+    def scale(self, lengths: Array, before: Array | None) -> Array:
+        """Diagonal of D, (n,), > 0, from the lengths of J's columns; ``before`` is the last D."""
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
-        """Damping of the first step."""
+    def first(self, stiffness: float) -> DampingState:
+        """Damping of the first step; ``stiffness`` is the square of the longest column in the metric D."""
 
     def success(self, state: DampingState, gain: float) -> DampingState:
         """Damping after an accepted step."""
@@ -93,16 +92,15 @@ class Nielsen:
         """True."""
         return True
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths or ones."""
         if self.scaling == "none":
-            return np.ones(jacobian.shape[1])
-        now = column_lengths(jacobian)
-        return now if before is None or self.scaling == "columns" else np.maximum(now, before)
+            return np.ones(len(lengths))
+        return lengths if before is None or self.scaling == "columns" else np.maximum(lengths, before)
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """Tau times the largest scaled diagonal entry of J^T J."""
-        return DampingState(self.tau * float(np.max(column_lengths(jacobian) / scale) ** 2), 2.0)
+        return DampingState(self.tau * stiffness, 2.0)
 
     def success(self, state: DampingState, gain: float) -> DampingState:
         """Shrink by the gain."""
@@ -131,11 +129,11 @@ class Ceres:
         """True."""
         return True
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths, clipped as the roots of Ceres' 1e-6 and 1e32."""
-        return np.clip(column_lengths(jacobian), 1e-3, 1e16)
+        return np.clip(lengths, 1e-3, 1e16)
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """One over the first radius."""
         return DampingState(1.0 / self.radius, 2.0)
 
@@ -158,11 +156,11 @@ class Undamped:
         """False."""
         return False
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths; without damping they change rounding only."""
-        return column_lengths(jacobian)
+        return lengths
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """Zero."""
         return DampingState(0.0, 2.0)
 

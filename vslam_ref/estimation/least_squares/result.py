@@ -21,21 +21,24 @@ class Iteration(NamedTuple):
     ----------
     cost : float
         After the step; the old cost where it was refused.
-    damping : float
-        lambda of this step.
-    step_norm : float
-        Length of the step in the metric D.
+    decrease : float
+        Of the cost; of a refused step what it would have been, negative or NaN.
     gradient_norm : float
         Largest cosine between a column of J and r *before* the step, in [0, 1].
+    step_norm : float
+        Length of the step in the metric D.
+    damping : float
+        lambda of this step.
     gain : float
         Actual over promised decrease; NaN where the trial had no finite cost or both are rounding.
     accepted : bool
     """
 
     cost: float
-    damping: float
-    step_norm: float
+    decrease: float
     gradient_norm: float
+    step_norm: float
+    damping: float
     gain: float
     accepted: bool
 
