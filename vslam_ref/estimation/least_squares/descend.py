@@ -34,6 +34,9 @@ class Descent(NamedTuple, Generic[Here]):
     history: tuple[Iteration, ...]
 
 
+End = tuple[Reason, str]
+
+
 class _Trial(NamedTuple, Generic[Here]):
     """What became of one step: the problem where it led, or None if it was refused."""
 
@@ -42,7 +45,7 @@ class _Trial(NamedTuple, Generic[Here]):
     cost: float = math.nan
     decrease: float = math.nan
     gain: float = math.nan
-    end: tuple[Reason, str] | None = None
+    end: End | None = None
 
 
 def descend(
@@ -100,12 +103,13 @@ def descend(
             state = grown
             continue
         state = rule.success(state, 1.0 if math.isnan(trial.gain) else trial.gain)
-        before, here = here, there
-        if end is not None and settled(before, here):
+        arrived = end is not None and settled(here, there)
+        here = there  # the old one's matrices are free now
+        if end is not None and arrived:
             return Descent(here, *end, tuple(history))
 
 
-def _arrived(here: Here, options: Options, tried: int, floor: float) -> tuple[Reason, str] | None:
+def _arrived(here: Here, options: Options, tried: int, floor: float) -> End | None:
     """A reason to try no further step."""
     if here.costs.sum() < floor:
         return "cost", f"residuals are zero to rounding, cost {here.costs.sum():.3g}"
@@ -125,21 +129,22 @@ def _try(
     if short and damping <= here.stiffness:
         return _Trial(end=("step", f"a step of {step.share:.3g} of x <= {options.step:g}"))
     total = float(here.costs.sum())
-    if short or (downhill and step.promised <= options.rounding * total):  # short only because damped
-        return _polish(problem, here, total) if polish else _Trial(end=("cost", "what is left is rounding"))
+    blind = downhill and step.promised <= options.rounding * total
+    if polish and (short or blind):  # short only because it is damped
+        return _polish(problem, here, total)
     place = problem.move(here, step)
     costs = None if place is None else problem.costs(place)
     # differences first, then the sum: equal digits of two large sums are not lost
     decrease = math.nan if costs is None else float((here.costs - costs).sum())
-    if place is None or costs is None or not math.isfinite(decrease):
-        return _Trial(None, step.length)
     gain = decrease / step.promised if step.promised > 0.0 else math.nan  # eq-gain-ratio
-    if downhill and not gain > options.least_gain:
-        return _Trial(None, step.length, math.nan, decrease, gain)
+    refused = not math.isfinite(decrease) or (downhill and not gain > options.least_gain)
+    if place is None or costs is None or refused:
+        why: End = ("cost", "no decrease is left that could be seen")
+        return _Trial(None, step.length, math.nan, decrease, gain, why if blind else None)
     small = max(abs(decrease), step.promised) <= options.cost * total
-    told = f"the cost changes by {decrease / total if total else 0.0:.3g} of itself <= {options.cost:g}"
-    end: tuple[Reason, str] | None = ("cost", told) if small else None
-    return _Trial(problem.linearise(place, here), step.length, float(costs.sum()), decrease, gain, end)
+    why = "cost", f"the cost changes by {decrease / (total or 1.0):.3g} of itself <= {options.cost:g}"
+    there = problem.linearise(place, here)
+    return _Trial(there, step.length, float(costs.sum()), decrease, gain, why if small else None)
 
 
 def _polish(problem: Questions[Place, Here], here: Here, total: float) -> _Trial[Here]:
@@ -148,22 +153,17 @@ def _polish(problem: Questions[Place, Here], here: Here, total: float) -> _Trial
     place = None if step is None else problem.move(here, step)
     there = None if place is None else problem.linearise(place, here)
     if step is not None and there is not None and there.gradient_norm < 0.5 * here.gradient_norm:
-        cost = float(there.costs.sum())
-        return _Trial(there, step.length, cost, float((here.costs - there.costs).sum()))
+        return _Trial(there, step.length, float(there.costs.sum()))
     # does the model promise little, or only its damped step?
     share = 0.0 if step is None else step.promised / total
     if share > FLAT:
-        why = "no step brings it: is the Jacobian right?"
-        why = (
-            why
-            if there is not None
-            else "its step leads to no finite cost: an overflow, or outside a lens's invertible field"
-        )
-        return _Trial(end=("stalled", f"the model promises {share:.3g} of the cost, but {why}"))
+        why = "a wrong Jacobian, or the edge of a lens's invertible field?"
+        told = f"the model promises {share:.3g} of the cost, but no step brings it: {why}"
+        return _Trial(end=("stalled", told))
     return _Trial(end=("cost", f"a whole step promises {share:.3g} of the cost, which is rounding"))
 
 
-def _refused(damping: float) -> tuple[Reason, str]:
+def _refused(damping: float) -> End:
     """The rule has no further damping to offer."""
     if damping == 0.0:
         return "not_finite", "an undamped step led to a residual or Jacobian that is not finite"

@@ -22,7 +22,7 @@ class Iteration(NamedTuple):
     cost : float
         After the step; the old cost where it was refused.
     decrease : float
-        Of the cost; of a refused step what it would have been, negative or NaN.
+        Of the cost; of a refused step what it would have been, negative or NaN; NaN below rounding, too.
     gradient_norm : float
         Largest cosine between a column of J and r *before* the step, in [0, 1].
     step_norm : float
@@ -32,6 +32,8 @@ class Iteration(NamedTuple):
     gain : float
         Actual over promised decrease; NaN where the trial had no finite cost or both are rounding.
     accepted : bool
+    sigma : float
+        Scale of the errors at which the step was judged, where a scale is found as the descent goes.
     """
 
     cost: float
@@ -41,6 +43,7 @@ class Iteration(NamedTuple):
     damping: float
     gain: float
     accepted: bool
+    sigma: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class Views:
 
     def rays(self, uv: ArrayLike) -> Rays:
         """Unit bearings (N, V, 3) of pixels (N, V, 2), each in its camera's frame."""
-        uv = self._pixels(uv)
+        uv = self.pixels(uv)
         if isinstance(self.cameras, Camera):
             return self.cameras.unproject(uv)
         found = [camera.unproject(uv[:, i]) for i, camera in enumerate(self.each)]
@@ -110,7 +110,14 @@ class Views:
         depth: Array = np.einsum("nvi,nvi->nv", bearings, X_cam)
         return depth
 
-    def _pixels(self, uv: ArrayLike) -> Array:
+    def pixels(self, uv: ArrayLike) -> Array:
+        """Pixels (N, V, 2) as an array.
+
+        Raises
+        ------
+        ValueError
+            If there is not one pixel a view.
+        """
         pixels = as_array("uv", uv, 2)
         if pixels.ndim != 3 or pixels.shape[1] != len(self):
             raise ValueError(f"uv has shape {pixels.shape}: need (N, {len(self)}, 2), one pixel a view")
