@@ -25,7 +25,10 @@ module                holds
 ====================  ============================================================================
 """
 
+from vslam_ref.estimation.bundle import book, diagnosis, gauge, local, outliers
+from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Observations, Scene, freedom
+from vslam_ref.estimation.bundle.projection import reprojection
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.solver import Options, bundle_adjust
 from vslam_ref.estimation.bundle.weights import Robust
@@ -40,6 +43,13 @@ __all__ = [
     "Options",
     "Robust",
     "Scene",
+    "book",
     "bundle_adjust",
+    "covariance",
+    "diagnosis",
     "freedom",
+    "gauge",
+    "local",
+    "outliers",
+    "reprojection",
 ]

@@ -222,6 +222,8 @@ def _projected(
 ) -> Array:
     """From the covariance with one gauge to that of the free one: P Sigma P with P = I - G G^T.
 
+    Implements :eq:`eq-free-covariance`.
+
     G are orthonormal directions of the gauge.  Sigma G is solved for, so that only chosen rows are needed.
     """
     assert system.factor is not None

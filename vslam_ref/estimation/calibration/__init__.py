@@ -3,6 +3,7 @@
 ==================  ==========================================================================
 module              holds
 ==================  ==========================================================================
+``book``            the algorithm of the chapter, to be read
 ``board``           the board, its corners in each view
 ``homography``      board plane to image, by the normalised direct linear transform
 ``zhang``           sensor from homographies, pose from a homography
@@ -17,7 +18,7 @@ module              holds
 ==================  ==========================================================================
 """
 
-from vslam_ref.estimation.calibration import ptam
+from vslam_ref.estimation.calibration import book, ptam
 from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
 from vslam_ref.estimation.calibration.homography import apply_homography, homography
@@ -41,6 +42,7 @@ __all__ = [
     "State",
     "View",
     "apply_homography",
+    "book",
     "calibrate",
     "calibrate_robustly",
     "find_start",

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera
@@ -87,6 +86,8 @@ def damped_step(N: Arrow, lam: float) -> tuple[Array, list[Array], float]:
 
 def moved(T_v: Array, xi: Array) -> Array:
     """Exp(xi) T_v."""
+    from scipy.linalg import expm
+
     x, y, z, a, b, c = xi
     return np.asarray(expm(np.array([[0, -c, b, x], [c, 0, -a, y], [-b, a, 0, z], [0, 0, 0, 0]])) @ T_v)
 

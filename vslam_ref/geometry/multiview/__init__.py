@@ -3,6 +3,7 @@
 =======================  ==========================================================================
 module                   holds
 =======================  ==========================================================================
+``book``                 the algorithms for one point or camera, to be read
 ``views``                cameras and poses as arrays over views; rays and pixels of all of them
 ``epipolar``             what a point in one image says about the other
 ``closest_point``        where two rays pass closest, with exact Jacobians
@@ -17,6 +18,7 @@ up: points in :mod:`vslam_ref.estimation.triangulation`, poses in :mod:`vslam_re
 """
 
 from vslam_ref.geometry.alignment import Alignment, align
+from vslam_ref.geometry.multiview import book, three_points
 from vslam_ref.geometry.multiview.closest_point import midpoint, midpoint_with_jacobians
 from vslam_ref.geometry.multiview.epipolar import (
     epipolar_distance,
@@ -49,6 +51,7 @@ __all__ = [
     "ThreePointPoses",
     "Views",
     "align",
+    "book",
     "correct_pair",
     "dlt",
     "epipolar_distance",
@@ -61,6 +64,7 @@ __all__ = [
     "relative_motion",
     "resect_linear",
     "sampson_distance",
+    "three_points",
     "tilted_twin",
     "triangulate_linear",
 ]
