@@ -208,10 +208,16 @@ def _linearise(views: Views, uv: Array, root: Array, X: Array) -> _Linear:
     return _Linear(cost, np.einsum("nvij,nvi->nj", J, r), np.einsum("nvij,nvik->njk", J, J))
 
 
-def _solve(H: Array, g: Array) -> Array:
-    """H^-1 g of symmetric matrices, scaled to a unit diagonal; zero where H is singular."""
+def _scaled_eigen(H: Array) -> tuple[Array, Array, Array]:
+    """Eigenvalues (N, 3) and vectors (N, 3, 3) of symmetric matrices scaled to a unit diagonal; the scale."""
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", H), 1e-300))
     values, vectors = np.linalg.eigh(H / scale[:, :, None] / scale[:, None, :])
+    return values, vectors, scale
+
+
+def _solve(H: Array, g: Array) -> Array:
+    """H^-1 g; zero along directions in which H is singular."""
+    values, vectors, scale = _scaled_eigen(H)
     flat = values <= FLAT * values[:, -1:]
     inverse = np.where(flat, 0.0, 1.0 / np.where(flat, 1.0, values))
     along = np.einsum("nij,ni->nj", vectors, g / scale) * inverse
@@ -234,9 +240,7 @@ def _rounding(uv: Array, root: Array) -> Array:
 
 def _covariance(H: Array) -> Array:
     """H^-1, or infinity on the diagonal where a direction is not measured."""
-    scale = np.sqrt(np.maximum(np.einsum("nii->ni", H), 1e-300))
-    scaled = H / scale[:, :, None] / scale[:, None, :]
-    values, vectors = np.linalg.eigh(scaled)
+    values, vectors, scale = _scaled_eigen(H)
     known = values[:, 0] > FLAT * values[:, -1]
     inverse = (vectors / np.where(known[:, None], values, 1.0)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
     cov = inverse / scale[:, :, None] / scale[:, None, :]

@@ -20,7 +20,6 @@ module              holds
 ``linear``          the damped step by QR, and covariances
 ``solver``          ``minimise``: a problem, descended
 ``result``          what comes back: solution, reason, history
-``regressions``     fifteen model functions of NIST's certified problems, with Jacobians
 ==================  ==========================================================================
 """
 

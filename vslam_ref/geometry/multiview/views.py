@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array
-from vslam_ref.geometry import camera_pose, se3
+from vslam_ref.geometry import camera_pose
 from vslam_ref.geometry.cameras import Camera, Projection, Rays, WorldProjectionJacobians
 
 
@@ -103,12 +103,6 @@ class Views:
             np.stack([f.J_point for f in found], 1),
             np.zeros((*uv.shape, 0)),
         )
-
-    def depth_along_rays(self, bearings: Array, X_world: Array) -> Array:
-        """How far along each ray the point lies, b . X_cam, shape (N, V); negative behind the camera."""
-        X_cam = se3.act(self.T_cam_world, X_world[:, None])
-        depth: Array = np.einsum("nvi,nvi->nv", bearings, X_cam)
-        return depth
 
     def pixels(self, uv: ArrayLike) -> Array:
         """Pixels (N, V, 2) as an array.
