@@ -20,7 +20,7 @@ from vslam_ref.estimation.bundle import (
     solver,
 )
 from vslam_ref.estimation.bundle import projection as bundle_projection
-from vslam_ref.estimation.bundle.step import possible
+from vslam_ref.estimation.bundle.adjustment import possible
 from vslam_ref.estimation.robust import Huber, Tukey
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.alignment import align

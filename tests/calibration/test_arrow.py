@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from vslam_ref.estimation import least_squares
-from vslam_ref.estimation.calibration import Board, Free, State, calibrate, simulated, stack
+from vslam_ref.estimation.calibration import Board, Free, State, calibrate, stack
 from vslam_ref.estimation.calibration.arrow import Arrow, Blocks, arrow, damped_step, promised, reduce
 from vslam_ref.estimation.calibration.problem import residual, residual_with_jacobians
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Radtan
+from vslam_ref.worlds import boards
 
 SIZE = (640, 480)
 BOARD = Board(6, 5, 0.04)
@@ -73,8 +74,8 @@ def test_singular_systems_are_none() -> None:
 def test_the_dense_solver_finds_the_same_camera_and_covariance() -> None:
     """The same sum over 6V + 9 unknowns by QR; both stop at gradient cosines of 1e-10."""
     rng = np.random.default_rng(11)
-    T = simulated.poses(BOARD, CAMERA, SIZE, 5, rng)
-    views = simulated.views(BOARD, CAMERA, T, 0.3, rng)
+    T = boards.poses(BOARD, CAMERA, SIZE, 5, rng)
+    views = boards.views(BOARD, CAMERA, T, 0.3, rng)
     ours = calibrate(views, SIZE)
     corners = stack(views)
     free = Free(Radtan)

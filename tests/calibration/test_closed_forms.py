@@ -14,10 +14,10 @@ from vslam_ref.estimation.calibration import (
     homography,
     pose_from_homography,
     sensor_from_homographies,
-    simulated,
 )
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
+from vslam_ref.worlds import boards
 
 EPS = float(np.finfo(float).eps)
 SIZE = (640, 480)
@@ -29,8 +29,8 @@ def images(seed: int, sigma: float = 0.0, views: int = 6) -> tuple[Pinhole, np.n
     rng = np.random.default_rng(seed)
     f = rng.uniform(300, 900)
     camera = Pinhole(f, f * rng.uniform(0.9, 1.1), rng.uniform(280, 360), rng.uniform(200, 280))
-    T = simulated.poses(BOARD, camera, SIZE, views, rng)
-    seen = simulated.views(BOARD, camera, T, sigma, rng)
+    T = boards.poses(BOARD, camera, SIZE, views, rng)
+    seen = boards.views(BOARD, camera, T, sigma, rng)
     return camera, T, np.stack([view.uv for view in seen])
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vslam_ref.estimation.calibration import Board, Free, Start, calibrate, simulated, stack
+from vslam_ref.estimation.calibration import Board, Free, Start, calibrate, stack
 from vslam_ref.geometry.cameras import Pinhole, Radtan
+from vslam_ref.worlds import boards
 
 SIZE = (640, 480)
 BOARD = Board(8, 6, 0.03)
@@ -15,8 +16,8 @@ CAMERA = Radtan(500, 505, 322, 238, -0.25, 0.06, 1e-3, -5e-4)
 
 def flat_views(tilt: float, sigma: float, seed: int = 0) -> list:
     rng = np.random.default_rng(seed)
-    T = simulated.poses(BOARD, CAMERA, SIZE, 10, rng, tilt=(tilt, tilt))
-    return simulated.views(BOARD, CAMERA, T, sigma, rng)
+    T = boards.poses(BOARD, CAMERA, SIZE, 10, rng, tilt=(tilt, tilt))
+    return boards.views(BOARD, CAMERA, T, sigma, rng)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.3])
@@ -32,8 +33,8 @@ def test_boards_parallel_to_the_image_plane(sigma: float, model: str) -> None:
 
 def test_one_view_many_times_counts_as_one() -> None:
     rng = np.random.default_rng(2)
-    T = simulated.poses(BOARD, CAMERA, SIZE, 1, rng, tilt=(0.5, 0.5))
-    found = calibrate(simulated.views(BOARD, CAMERA, np.repeat(T, 6, axis=0), 0.3, rng), SIZE)
+    T = boards.poses(BOARD, CAMERA, SIZE, 1, rng, tilt=(0.5, 0.5))
+    found = calibrate(boards.views(BOARD, CAMERA, np.repeat(T, 6, axis=0), 0.3, rng), SIZE)
     assert "nearly parallel to each other, and count as one view" in found.undetermined
 
 
@@ -126,14 +127,14 @@ def test_boards() -> None:
 
 
 def test_simulated_boards_refuse_what_they_cannot_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulated, "TRIES", 50)
+    monkeypatch.setattr(boards, "TRIES", 50)
     rng = np.random.default_rng(0)
     with pytest.raises(ValueError, match="needs a random generator"):
-        simulated.views(BOARD, CAMERA, np.eye(4)[None], 0.1)
+        boards.views(BOARD, CAMERA, np.eye(4)[None], 0.1)
     with pytest.raises(ValueError, match="behind the camera"):
-        simulated.views(BOARD, CAMERA, np.eye(4)[None])
+        boards.views(BOARD, CAMERA, np.eye(4)[None])
     with pytest.raises(ValueError, match="only 0 of 2 poses"):
-        simulated.poses(BOARD, CAMERA, SIZE, 2, rng, fill=(3.0, 3.0))
+        boards.poses(BOARD, CAMERA, SIZE, 2, rng, fill=(3.0, 3.0))
 
 
 def test_basis_of_free_parameters() -> None:

@@ -12,7 +12,6 @@ from vslam_ref.estimation.calibration import (
     calibrate,
     calibrate_robustly,
     ptam,
-    simulated,
     stack,
 )
 from vslam_ref.estimation.calibration.parameters import Free
@@ -20,6 +19,7 @@ from vslam_ref.estimation.calibration.problem import Problem, State
 from vslam_ref.estimation.robust import L2
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import MODELS, Camera, Fisheye, Fov, Pinhole, Radtan, Rational
+from vslam_ref.worlds import boards
 
 SIZE = (640, 480)
 BOARD = Board(11, 8, 0.03)
@@ -44,7 +44,7 @@ def scene(
     camera: Camera, views: int = 12, seed: int = 1, **more: object
 ) -> tuple[np.ndarray, np.random.Generator]:
     rng = np.random.default_rng(seed)
-    return simulated.poses(BOARD, camera, SIZE, views, rng, **more), rng  # type: ignore[arg-type]
+    return boards.poses(BOARD, camera, SIZE, views, rng, **more), rng  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -54,7 +54,7 @@ def test_found_without_being_told_a_start(name: str) -> None:
     """
     camera = CAMERAS[name]
     T, rng = scene(camera, fill=(0.5, 1.0), tilt=(0.1, 0.9))
-    found = calibrate(simulated.views(BOARD, camera, T, 0.2, rng), SIZE, model_of(camera))
+    found = calibrate(boards.views(BOARD, camera, T, 0.2, rng), SIZE, model_of(camera))
     assert found.converged
     assert not found.undetermined
     assert abs(found.sigma_px / 0.2 - 1) < 5 / np.sqrt(2 * 2 * 12 * 88)
@@ -69,7 +69,7 @@ def test_exact_corners_give_the_camera_back(name: str) -> None:
     """Corners are rounded to eps of 640 px, 1e-13; deviations are below 1e3 px per px of noise."""
     camera = CAMERAS[name]
     T, _ = scene(camera)
-    found = calibrate(simulated.views(BOARD, camera, T), SIZE, model_of(camera))
+    found = calibrate(boards.views(BOARD, camera, T), SIZE, model_of(camera))
     assert found.converged
     assert (np.abs(found.camera.params - camera.params) < 1e-9 * np.maximum(1.0, camera.params)).all()
     assert np.abs(found.T_cam_board - T).max() < 1e-9
@@ -84,15 +84,15 @@ def test_covariance_is_honest() -> None:
     start = Start(camera, T, 0.0)
     total, runs = 0.0, 60
     for _ in range(runs):
-        found = calibrate(simulated.views(BOARD, camera, T, 0.3, rng), SIZE, start=start)
+        found = calibrate(boards.views(BOARD, camera, T, 0.3, rng), SIZE, start=start)
         assert found.covariance is not None
         error = found.camera.params - camera.params
         total += error @ np.linalg.solve(found.covariance, error)
     low, high = chi2.ppf([5e-5, 1 - 5e-5], 9 * runs)
     assert low < total < high
     # the mistake, poses taken as known, is far outside: the true deviations are several times larger
-    problem = Problem(stack(simulated.views(BOARD, camera, T)), Free(Radtan), L2())
-    point = problem.at(State(camera.params, T))
+    problem = Problem(stack(boards.views(BOARD, camera, T)), Free(Radtan), L2())
+    point = problem.linearise(State(camera.params, T))
     assert point is not None
     naive = 0.3 * np.sqrt(np.diag(np.linalg.inv(point.normal.C)))
     assert found.std["cx"] > 3 * naive[2]
@@ -101,7 +101,7 @@ def test_covariance_is_honest() -> None:
 def test_fixed_parameters_stay_and_the_rest_is_better_known() -> None:
     camera = CAMERAS["radtan"]
     T, rng = scene(camera)
-    views = simulated.views(BOARD, camera, T, 0.2, rng)
+    views = boards.views(BOARD, camera, T, 0.2, rng)
     all_free = calibrate(views, SIZE)
     fixed = {"k3": 0.0, "cx": 322.0, "cy": 238.0}
     some = calibrate(views, SIZE, fixed=fixed, aspect=505 / 500)
@@ -121,7 +121,7 @@ def test_views_may_have_different_corners() -> None:
     T, rng = scene(camera)
     views = [
         (X[keep], uv[keep])
-        for X, uv in simulated.views(BOARD, camera, T, 0.1, rng)
+        for X, uv in boards.views(BOARD, camera, T, 0.1, rng)
         for keep in [rng.permutation(88)[: rng.integers(20, 88)]]
     ]
     found = calibrate(views, SIZE)
@@ -136,7 +136,7 @@ def test_wrong_corners_bend_least_squares_and_not_tukey() -> None:
     """Five corners in a hundred 2 to 6 px off, all to the right."""
     camera = CAMERAS["radtan"]
     T, rng = scene(camera)
-    views = simulated.views(BOARD, camera, T, 0.2, rng)
+    views = boards.views(BOARD, camera, T, 0.2, rng)
     bad = rng.random((12, 88)) < 0.05
     for view, lost in zip(views, bad, strict=True):
         view.uv[lost, 0] += rng.uniform(2, 6, lost.sum())
@@ -156,17 +156,17 @@ def test_ptams_step_leaves_nine_tenths() -> None:
     """
     camera = CAMERAS["fov, PTAM's lens"]
     T, rng = scene(camera, views=6)
-    views = simulated.views(BOARD, camera, T, 0.2, rng)
+    views = boards.views(BOARD, camera, T, 0.2, rng)
     best = calibrate(views, SIZE, "fov")
     problem = Problem(stack(views), Free(Fov), L2())
     near = se3.perturb(best.T_cam_board, 1e-3 * np.ones(6))
     state = State(best.camera.params + [2.0, 2.0, 1.0, -1.0, 0.01], near)
-    point = problem.at(state)
+    point = problem.linearise(state)
     assert point is not None
     least = 0.5 * float((best.residual**2).sum())
     gaps = [point.cost - least]
     for _ in range(40):
-        point = problem.at(ptam.ptam_step(problem, point, SIZE))
+        point = problem.linearise(ptam.ptam_step(problem, point, SIZE))
         assert point is not None
         gaps.append(point.cost - least)
     ratios = np.array(gaps[1:]) / gaps[:-1]
@@ -190,8 +190,8 @@ def test_any_camera_any_image_size() -> None:
         lens["fisheye"] = [*(0.1 * k[:2]), 0.0, 0.0]
         model = str(rng.choice(list(lens)))
         camera = MODELS[model].from_params([*sensor, *lens[model]])
-        T = simulated.poses(board, camera, size, int(rng.integers(4, 20)), rng, fill=(0.3, 0.9))
-        found = calibrate(simulated.views(board, camera, T, 0.3, rng), size, model)
+        T = boards.poses(board, camera, size, int(rng.integers(4, 20)), rng, fill=(0.3, 0.9))
+        found = calibrate(boards.views(board, camera, T, 0.3, rng), size, model)
         assert found.converged
         assert found.covariance is not None
         error = found.camera.params - camera.params

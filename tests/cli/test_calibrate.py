@@ -14,9 +14,10 @@ from vslam_ref import _kernels, cli
 from vslam_ref.commands import calibrate as command
 from vslam_ref.datasets import checkerboard, pictures
 from vslam_ref.datasets.calibration_files import read_opencv
-from vslam_ref.estimation.calibration import Board, calibrate, simulated
+from vslam_ref.estimation.calibration import Board, calibrate
 from vslam_ref.estimation.robust import LOSSES
 from vslam_ref.geometry.cameras import MODELS, Radtan
+from vslam_ref.worlds import boards
 
 KEYS = [
     "model", "image_size", "images", "used", "skipped", "rms_px", "mean_px", "camera_matrix", "distortion",
@@ -47,7 +48,7 @@ def board_image(T_cam_board: np.ndarray) -> np.ndarray:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Eight pictures of the board, one of nothing."""
     path = tmp_path_factory.mktemp("boards")
-    T = simulated.poses(BOARD, TRUTH, SIZE, 8, np.random.default_rng(3), tilt=(0.3, 0.7), fill=(0.45, 0.65))
+    T = boards.poses(BOARD, TRUTH, SIZE, 8, np.random.default_rng(3), tilt=(0.3, 0.7), fill=(0.45, 0.65))
     for i, pose in enumerate(T):
         cv2.imwrite(str(path / f"{i}.png"), board_image(pose))
     cv2.imwrite(str(path / "wall.png"), np.full((240, 320), 128, np.uint8))
@@ -177,7 +178,7 @@ def test_boards_that_do_not_determine_the_camera_write_nothing(
 ) -> None:
     """All boards parallel to the image plane."""
     rng = np.random.default_rng(1)
-    T = simulated.poses(BOARD, TRUTH, SIZE, 3, rng, tilt=(0.0, 0.0), fill=(0.6, 0.8))
+    T = boards.poses(BOARD, TRUTH, SIZE, 3, rng, tilt=(0.0, 0.0), fill=(0.6, 0.8))
     for i, pose in enumerate(T):
         cv2.imwrite(str(tmp_path / f"{i}.png"), board_image(pose))
     out, target = tmp_path / "camera.yaml", tmp_path / "numbers.json"

@@ -65,8 +65,8 @@ def _for_schur(
     weights = rng.uniform(0.5, 1, len(table.order))
     normal = normal_equations(given.model, table.state(given), table, weights, given.free.intrinsics)
     M = schur.point_factor(normal.C, np.ones((2 * n, 3)), table.free_point)
-    sizes = (table.links.view, table.columns, table.size, table.offsets, table.runs)
-    return (normal.B, normal.g_view, normal.g_point, normal.W, M, *sizes, *table.windows)
+    sizes = (table.links.view, table.columns, table.size, table.offsets)
+    return (normal.B, normal.g_view, normal.g_point, normal.W, M, *sizes)
 
 
 def for_schur(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
@@ -91,7 +91,7 @@ def for_schur_shared_held(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 
 
 def for_point_steps(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    _, _, g_point, W, M, view, columns, _, offsets, *_ = for_schur(rng, B, n)
+    _, _, g_point, W, M, view, columns, _, offsets = for_schur(rng, B, n)
     return W, M, g_point, rng.normal(size=columns.shape), view, offsets
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import catalogue, nist
+from vslam_ref.datasets.nist_models import MODELS
 from vslam_ref.estimation.least_squares import Ceres, Damping, Nielsen, Options, Solution, Undamped, minimise
-from vslam_ref.estimation.least_squares.regressions import MODELS
 
 FOLDER = catalogue.find("nist_nls")
 needs_data = pytest.mark.skipif(FOLDER is None, reason="nist_nls is not in VSLAM_REF_DATA")

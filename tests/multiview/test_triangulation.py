@@ -9,9 +9,10 @@ import mpmath
 import numpy as np
 import pytest
 
+from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Fisheye, Fov, Pinhole, Radtan
-from vslam_ref.geometry.multiview import PointState, Views, triangulate, triangulate_linear
+from vslam_ref.geometry.multiview import PointState, Views, triangulate_linear
 
 EPS = float(np.finfo(float).eps)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview import (
     Views,
@@ -18,7 +19,6 @@ from vslam_ref.geometry.multiview import (
     midpoint,
     relative_motion,
     sampson_distance,
-    triangulate,
 )
 
 EPS = float(np.finfo(float).eps)

@@ -126,25 +126,10 @@ def _subtract_entries(S, rows, columns, V, Z):
 
 @kernel(
     *(given(3), given(2), given(2), given(3), given(3), given(1, _int), given(2, _int), _int),
-    *(given(1, _int), given(1, _int), given(1, _int), given(1, _int), given(1, _int), given(2, _int)),
+    given(1, _int),
     returns=types.Tuple((_array(2), _array(1))),
 )
-def schur_complement(
-    B,
-    g_view,
-    g_point,
-    W,
-    M,
-    view,
-    columns,
-    size,
-    offsets,
-    runs,
-    window_points,
-    window_offsets,
-    window_columns,
-    local,
-):
+def schur_complement(B, g_view, g_point, W, M, view, columns, size, offsets):
     """Twin of :func:`vslam_ref.estimation.bundle.schur.schur_complement`: blocks of pairs of observations."""
     views, d = g_view.shape
     S, rhs = np.zeros((size, size)), np.zeros(size)
@@ -161,14 +146,13 @@ def schur_complement(
     longest = 1
     for j in range(len(offsets) - 1):
         longest = max(longest, offsets[j + 1] - offsets[j])
-    # parts: one an observation and, of shared lenses, one a run
+    # parts: one an observation and one for each shared lens that sees the point
     V, at, span = (
         np.empty((2 * longest, d, 3)),
         np.empty((2 * longest, d), np.int64),
         np.empty((2 * longest, 4), np.int64),
     )
     W, columns = np.ascontiguousarray(W), np.ascontiguousarray(columns)  # no copies, mostly; quicker to index
-    run = 0
     for j in range(len(offsets) - 1):
         begin, end = offsets[j], offsets[j + 1]
         m00, m01, m02, m11, m12, m22 = M[j, 0, 0], M[j, 0, 1], M[j, 0, 2], M[j, 1, 1], M[j, 1, 2], M[j, 2, 2]
@@ -179,8 +163,7 @@ def schur_complement(
             parts = _add_part(parts, columns[view[o], :own], size, at, span)
         lens_part = parts - 1
         for o in range(begin, end):
-            if shared and run < len(runs) and runs[run] == o:
-                run += 1
+            if shared and (o == begin or columns[view[o], own] != columns[view[o - 1], own]):
                 lens_part += 1
                 V[lens_part] = 0.0
                 parts = _add_part(parts, columns[view[o], own:], size, at, span)

@@ -10,6 +10,7 @@ module                                      holds
 ``calibration_files``                       cameras
 ``trajectories``                            poses over time
 ``nist``                                    certified regressions
+``nist_models``                             their fifteen model functions, with Jacobians
 ``pictures``, ``checkerboard``              grey values, and the corners in them
 ``middlebury``, ``matching``                pictures with exact cameras; the same points in several
 ``grid_files``, ``video``                   occupancy maps and films

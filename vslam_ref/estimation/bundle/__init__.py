@@ -13,8 +13,8 @@ module                holds
 ``schur``             points eliminated, and back again
 ``reduced_system``    the system of the views: dense or banded Cholesky
 ``weights``           robust loss, fixed or adaptive scale
-``step``              one damped step, and where it leads
-``solver``            the loop, and the reasons to end it
+``adjustment``        what a descent asks: one damped step, and where it leads
+``solver``            a problem, descended
 ``result``            what comes back
 ``book``              the same algorithm in plain loops, to be read, and to be compared with
 ``diagnosis``         what is wrong with a problem before anything is solved
@@ -25,10 +25,14 @@ module                holds
 ====================  ============================================================================
 """
 
+from vslam_ref.estimation.bundle import book, diagnosis, gauge, local, outliers
+from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Observations, Scene, freedom
-from vslam_ref.estimation.bundle.result import BundleResult, Iteration
+from vslam_ref.estimation.bundle.projection import reprojection
+from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.solver import Options, bundle_adjust
 from vslam_ref.estimation.bundle.weights import Robust
+from vslam_ref.estimation.least_squares import Iteration
 
 __all__ = [
     "BundleProblem",
@@ -39,6 +43,13 @@ __all__ = [
     "Options",
     "Robust",
     "Scene",
+    "book",
     "bundle_adjust",
+    "covariance",
+    "diagnosis",
     "freedom",
+    "gauge",
+    "local",
+    "outliers",
+    "reprojection",
 ]

@@ -23,7 +23,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle.problem import BundleProblem, Scene
@@ -84,10 +83,10 @@ def bundle_adjust_book(
         steps, promised = damped_steps(blocks, damping)
         trial = moved(problem, scene, steps)
         new_cost = total_cost(problem, trial, loss)
-        gain = (cost - new_cost) / promised
+        gain = (cost - new_cost) / promised  # eq-gain-ratio
         if gain > 1e-3:
             scene, cost, growth = trial, new_cost, 2.0
-            damping *= max(1 / 3, 1 - (2 * min(gain, 1.0) - 1) ** 3)
+            damping *= max(1 / 3, 1 - (2 * min(gain, 1.0) - 1) ** 3)  # eq-nielsen
         else:
             damping, growth = damping * growth, growth * 2.0
         costs.append(cost)
@@ -106,8 +105,8 @@ def total_cost(problem: BundleProblem, scene: Scene, loss: Loss) -> float:
         uv, valid = camera.pixel_from_world(scene.T_cam_world[i], scene.X_world[j])
         if not valid:
             return math.inf
-        error = uv - problem.seen.uv[o]
-        total += float(loss.cost(_length(problem, o, error)))
+        error = uv - problem.seen.uv[o]  # eq-ba-residual
+        total += float(loss.cost(_length(problem, o, error)))  # eq-a1-4, eq-a2-9
     return total
 
 
@@ -122,8 +121,8 @@ def normal_blocks(problem: BundleProblem, scene: Scene, loss: Loss) -> _Blocks:
         seen = camera.pixel_from_world_with_jacobians(scene.T_cam_world[i], scene.X_world[j])
         error = seen.uv - problem.seen.uv[o]
         weight = float(loss.weight(_length(problem, o, error)))
-        information = weight * _information(problem, o)
-        J = {
+        information = weight * _information(problem, o)  # eq-reweighted
+        J = {  # eq-ba-jacobians
             ("view", i): seen.J_pose[:, problem.free.pose[i]],
             ("lens", at): seen.J_intrinsics @ problem.free.intrinsics,
             ("point", j): seen.J_point if problem.free.point[j] else seen.J_point[:, :0],
@@ -131,7 +130,7 @@ def normal_blocks(problem: BundleProblem, scene: Scene, loss: Loss) -> _Blocks:
         for a in J:
             g[a] = g.get(a, 0.0) + J[a].T @ information @ error
             for b in J:
-                H[a, b] = H.get((a, b), 0.0) + J[a].T @ information @ J[b]
+                H[a, b] = H.get((a, b), 0.0) + J[a].T @ information @ J[b]  # eq-ba-blocks
     return _Blocks(H, g)
 
 
@@ -140,7 +139,7 @@ def damped_steps(blocks: _Blocks, damping: float) -> tuple[dict[Key, Array], flo
     H, g = dict(blocks.H), dict(blocks.g)
     metric = {a: np.clip(np.diag(H[a, a]), 1e-6, 1e32) for a in g}
     for a in g:
-        H[a, a] = H[a, a] + damping * np.diag(metric[a])
+        H[a, a] = H[a, a] + damping * np.diag(metric[a])  # eq-ba-normal, damped
     rest = [a for a in g if a[0] != "point"]
     points = [a for a in g if a[0] == "point" and len(g[a])]
     S = {(a, b): H[a, b].copy() for a in rest for b in rest if (a, b) in H}
@@ -149,13 +148,13 @@ def damped_steps(blocks: _Blocks, damping: float) -> tuple[dict[Key, Array], flo
         inverse = np.linalg.inv(H[p, p])
         meets = [a for a in rest if (a, p) in H]
         for a in meets:
-            rhs[a] = rhs[a] + H[a, p] @ inverse @ g[p]
+            rhs[a] = rhs[a] + H[a, p] @ inverse @ g[p]  # eq-schur
             for b in meets:
-                S[a, b] = S.get((a, b), 0.0) - H[a, p] @ inverse @ H[p, b]
+                S[a, b] = S.get((a, b), 0.0) - H[a, p] @ inverse @ H[p, b]  # eq-covisibility
     steps = _solve(S, rhs, rest)
     for p in points:
         pulled = g[p] + sum((H[p, a] @ steps[a] for a in rest if (p, a) in H), np.zeros(3))
-        steps[p] = -np.linalg.inv(H[p, p]) @ pulled
+        steps[p] = -np.linalg.inv(H[p, p]) @ pulled  # eq-back-substitution
     square = sum(float(metric[a] @ steps[a] ** 2) for a in steps)
     slope = sum(float(g[a] @ steps[a]) for a in steps)
     return steps, 0.5 * (damping * square - slope)
@@ -174,6 +173,8 @@ def _solve(S: dict[tuple[Key, Key], Array], rhs: dict[Key, Array], keys: list[Ke
 
 def moved(problem: BundleProblem, scene: Scene, steps: dict[Key, Array]) -> Scene:
     """Scene after the steps: T <- expm(hat(xi)) T, all else by addition."""
+    from scipy.linalg import expm
+
     T, X, lenses = scene.T_cam_world.copy(), scene.X_world.copy(), scene.intrinsics.copy()
     for (kind, number), step in steps.items():
         if kind == "point":

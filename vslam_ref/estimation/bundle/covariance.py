@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle import reduced_system, schur
 from vslam_ref.estimation.bundle.gauge import fix_gauge, gauge_directions
-from vslam_ref.estimation.bundle.normal import Normal, normal_equations
+from vslam_ref.estimation.bundle.normal import Normal, normal_equations, sum_by_point
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.structure import Structure, structure
@@ -102,8 +102,9 @@ def covariance(
     With a robust loss the final weights are taken as given, which is slightly too sure.
     """
     problem = result.problem
-    chosen_views = _numbers("view", views, problem.sizes[0])
-    chosen_points = _numbers("point", points, problem.sizes[1])
+    chosen = _Chosen(
+        _numbers("view", views, problem.sizes[0]), _numbers("point", points, problem.sizes[1]), problem
+    )
     if gauge == "free":
         if not (problem.free.pose.all() and problem.free.point.all()):
             raise ValueError("gauge='free': the problem holds a view or a point; say gauge='fixed'")
@@ -113,28 +114,31 @@ def covariance(
     dof = 2 * int(np.count_nonzero(result.weights)) - table.size - 3 * int(system.measured.sum())
     if sigma is None:
         sigma = math.sqrt(system.square / dof) if dof > 0 else math.inf
-    told = _open(system, table, chosen_points, dof, sigma)
-    if told or system.factor is None:
+    told = _open(system, chosen, dof, sigma)
+    if told:
         return BundleCovariance(None, None, None, sigma, told)
-    rows = _Selection(system, table, chosen_views, chosen_points)
-    matrix = rows.covariance()
-    if gauge == "free":
-        matrix = _projected(matrix, rows, problem, table, system)
-    matrix *= sigma**2
-    k = 6 * len(chosen_views)
+    rows = chosen.of(system.solve(*chosen.units(table)), table)
+    matrix = sigma**2 * (_projected(rows, chosen, system) if gauge == "free" else (rows + rows.T) / 2)
+    k = 6 * len(chosen.views)
     view = np.array([matrix[a : a + 6, a : a + 6] for a in range(0, k, 6)]).reshape(-1, 6, 6)
     point = np.array([matrix[a : a + 3, a : a + 3] for a in range(k, len(matrix), 3)]).reshape(-1, 3, 3)
     return BundleCovariance(matrix, view, point, sigma, "")
+
+
+class _Blocks(NamedTuple):
+    """Columns over all unknowns: views' coordinates and a waste row (D + 1, k), sorted points (N, 3, k)."""
+
+    view: Array
+    point: Array
 
 
 class _System(NamedTuple):
     """Factored normal equations at a solution, without damping."""
 
     normal: Normal
+    table: Structure
     M: Array
-    measured: BoolArray
     factor: reduced_system.Factor | None
-    weakest: float
     square: float
 
     @classmethod
@@ -146,109 +150,104 @@ class _System(NamedTuple):
         S, _ = schur.reduce(normal, M, np.zeros(table.size), table)
         # columns of length 1, so that metres and radians are judged alike
         scale = np.sqrt(np.where(np.diag(S) > 0, np.diag(S), 1.0))
-        weakest = _weakest(S / np.outer(scale, scale))
-        factor = reduced_system.factor(S, table.border, table.bandwidth, "dense") if weakest > 0 else None
+        regular = _is_regular(S / np.outer(scale, scale))
+        factor = reduced_system.factor(S, table.border, table.bandwidth, "dense") if regular else None
         errors = whitened(problem.seen.cov_uv, result.residual)
         square = float(np.einsum("n,ni,ni->", result.weights, errors, errors))
-        return cls(normal, M, M[:, 0, 0] > 0, factor, weakest, square)
+        return cls(normal, table, M, factor, square)
+
+    @property
+    def measured(self) -> BoolArray:
+        """Points (N,) that their observations determine."""
+        return np.asarray(self.M[:, 0, 0] > 0)
+
+    def solve(self, view: Array, point: Array) -> _Blocks:
+        """Inverse normal matrix times some columns, by elimination of the points: the chapter's two rows."""
+        assert self.factor is not None
+        table, W, M_T = self.table, self.normal.W, np.swapaxes(self.M, 1, 2)
+        view, at = view.copy(), table.columns[table.links.view]
+        seen = np.matmul(W, (self.M @ (M_T @ point))[table.links.point])
+        np.subtract.at(view, at.ravel(), seen.reshape(-1, view.shape[1]))
+        x = np.vstack([self.factor.solve(view[:-1]), np.zeros((1, view.shape[1]))])
+        back = np.matmul(np.swapaxes(W, 1, 2), x[at]).reshape(len(W), -1)
+        pulled = sum_by_point(back, table.offsets).reshape(point.shape)
+        return _Blocks(x, self.M @ (M_T @ (point - pulled)))
 
 
-def _weakest(S: Array) -> float:
-    """Smallest squared pivot of the scaled matrix above its rounding, else 0."""
+class _Chosen(NamedTuple):
+    """What is asked for: numbers of views and points in the problem."""
+
+    views: IntArray
+    points: IntArray
+    problem: BundleProblem
+
+    def places(self, table: Structure) -> tuple[IntArray, IntArray]:
+        """Columns of the views' coordinates, and numbers of the sorted points."""
+        return table.columns[self.views][:, :6].ravel(), np.argsort(table.point_order)[self.points]
+
+    def units(self, table: Structure) -> _Blocks:
+        """Unit vectors of the chosen coordinates; zero for what is fixed."""
+        columns, points = self.places(table)
+        k, count = len(columns), len(columns) + 3 * len(points)
+        view, point = np.zeros((table.size + 1, count)), np.zeros((len(table.point_order), 3, count))
+        view[columns, np.arange(k)] = 1.0
+        view[table.size] = 0.0
+        for axis in range(3):
+            point[points, axis, k + axis + 3 * np.arange(len(points))] = 1.0
+        return _Blocks(view, point)
+
+    def of(self, blocks: _Blocks, table: Structure) -> Array:
+        """Rows of the chosen coordinates, (6 k + 3 m, columns)."""
+        columns, points = self.places(table)
+        return np.concatenate([blocks.view[columns], blocks.point[points].reshape(-1, blocks.view.shape[1])])
+
+
+def _is_regular(S: Array) -> bool:
+    """Whether the smallest squared pivot of the scaled matrix is above its rounding."""
     from scipy.linalg import LinAlgError, cholesky
 
-    if len(S) == 0:
-        return 1.0
     try:
         pivots = np.diag(cholesky(S, lower=True, check_finite=False)) ** 2
     except LinAlgError:
-        return 0.0
-    smallest = float(pivots.min())
-    return smallest if smallest > 100 * len(S) * schur.EPS else 0.0
+        return False
+    return bool(pivots.min(initial=1.0) > 100 * len(S) * schur.EPS)
 
 
-def _open(system: _System, table: Structure, chosen: IntArray, dof: int, sigma: float) -> str:
+def _open(system: _System, chosen: _Chosen, dof: int, sigma: float) -> str:
     """Why there is no covariance, or nothing."""
     if math.isinf(sigma):
         return f"{dof} redundant measurements: the noise is unknown; say sigma"
     if system.factor is None:
         return "the normal matrix is singular: the gauge is free (fix it, or ask for it), or a view is loose"
-    sorted_points = np.argsort(table.point_order)[chosen]
-    bad = np.flatnonzero(table.free_point[sorted_points] & ~system.measured[sorted_points])
+    _, points = chosen.places(system.table)
+    bad = np.flatnonzero(system.table.free_point[points] & ~system.measured[points])
     if len(bad):
-        return f"point {chosen[bad[0]]} is not determined by its observations"
+        return f"point {chosen.points[bad[0]]} is not determined by its observations"
     return ""
 
 
-class _Selection:
-    """Rows of the inverse for chosen views and points."""
-
-    def __init__(self, system: _System, table: Structure, views: IntArray, points: IntArray) -> None:
-        self.system, self.table = system, table
-        self.views = views
-        self.columns = table.columns[views][:, :6].ravel()
-        self.points = np.argsort(table.point_order)[points]
-
-    def covariance(self) -> Array:
-        """Block of the inverse normal matrix for the selection."""
-        assert self.system.factor is not None
-        size = self.table.size
-        right = np.zeros((size + 1, len(self.columns) + 3 * len(self.points)))
-        right[self.columns, np.arange(len(self.columns))] = 1.0
-        k = len(self.columns)
-        for number, j in enumerate(self.points):
-            right[:, k + 3 * number : k + 3 * number + 3] = -self._coupling(int(j))
-        right[size] = 0.0
-        solved = np.vstack([self.system.factor.solve(right[:size]), np.zeros((1, right.shape[1]))])
-        matrix = right.T @ solved
-        for number, j in enumerate(self.points):
-            at = slice(k + 3 * number, k + 3 * number + 3)
-            matrix[at, at] += self.system.M[j] @ self.system.M[j].T
-        return np.asarray((matrix + matrix.T) / 2)
-
-    def _coupling(self, j: int) -> Array:
-        """W C^-1 of one point, (D + 1, 3)."""
-        table, out = self.table, np.zeros((self.table.size + 1, 3))
-        part = slice(table.offsets[j], table.offsets[j + 1])
-        inverse = self.system.M[j] @ self.system.M[j].T
-        at = table.columns[table.links.view[part]]
-        np.add.at(out, at.ravel(), (self.system.normal.W[part] @ inverse).reshape(-1, 3))
-        out[table.size] = 0.0
-        return out
-
-
-def _projected(
-    matrix: Array, rows: _Selection, problem: BundleProblem, table: Structure, system: _System
-) -> Array:
+def _projected(rows: Array, chosen: _Chosen, system: _System) -> Array:
     """From the covariance with one gauge to that of the free one: P Sigma P with P = I - G G^T.
 
+    Implements :eq:`eq-free-covariance`.
     G are orthonormal directions of the gauge.  Sigma G is solved for, so that only chosen rows are needed.
     """
-    assert system.factor is not None
-    views, points = gauge_directions(problem.scene)
-    points = points[table.point_order]
-    joint = np.concatenate([views.reshape(-1, 7), points.reshape(-1, 7)])
-    turn = np.linalg.inv(np.linalg.qr(joint, mode="r"))
-    views, points = views @ turn, points @ turn
-    size = table.size
-    G_view = np.zeros((size + 1, 7))
-    np.add.at(G_view, table.columns[:, :6].ravel(), views.reshape(-1, 7))
-    pulled = np.einsum("nij,njk->nik", np.swapaxes(system.M, 1, 2), points)
-    V = np.matmul(system.normal.W, system.M[table.links.point])
-    seen = (V @ pulled[table.links.point]).reshape(-1, 7)
-    np.subtract.at(G_view, table.columns[table.links.view].ravel(), seen)
-    x_view = np.vstack([system.factor.solve(G_view[:size]), np.zeros((1, 7))])
-    back = np.zeros_like(points)
-    at_view = x_view[table.columns[table.links.view]]
-    np.add.at(back, table.links.point, np.einsum("ndk,ndg->nkg", system.normal.W, at_view))
-    x_point = system.M @ (np.swapaxes(system.M, 1, 2) @ (points - back))
-    inner = np.einsum("vig,vih->gh", views, x_view[table.columns[:, :6]])
-    inner += np.einsum("nig,nih->gh", points, x_point)
-    G_rows = np.concatenate([views[rows.views].reshape(-1, 7), points[rows.points].reshape(-1, 7)])
-    X_rows = np.concatenate(
-        [x_view[table.columns[rows.views][:, :6]].reshape(-1, 7), x_point[rows.points].reshape(-1, 7)]
+    table = system.table
+    views, points = gauge_directions(chosen.problem.scene)
+    turn = np.linalg.inv(
+        np.linalg.qr(np.concatenate([views.reshape(-1, 7), points.reshape(-1, 7)]), mode="r")
     )
-    return np.asarray(matrix - G_rows @ X_rows.T - X_rows @ G_rows.T + G_rows @ inner @ G_rows.T)
+    views, points = views @ turn, points[table.point_order] @ turn
+    view = np.zeros((table.size + 1, 7))
+    np.add.at(view, table.columns[:, :6].ravel(), views.reshape(-1, 7))
+    solved = system.solve(view, points)
+    inner = np.einsum("vig,vih->gh", views, solved.view[table.columns[:, :6]])
+    inner += np.einsum("nig,nih->gh", points, solved.point)
+    # what is held has a direction, too: rows of G are not those of the columns
+    G = np.concatenate([views[chosen.views].reshape(-1, 7), points[chosen.places(table)[1]].reshape(-1, 7)])
+    X = chosen.of(solved, table)
+    free = rows - G @ X.T - X @ G.T + G @ inner @ G.T
+    return np.asarray((free + free.T) / 2)
 
 
 def _numbers(name: str, given: ArrayLike, count: int) -> IntArray:

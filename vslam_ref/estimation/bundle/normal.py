@@ -118,16 +118,9 @@ def _blocks(
         part = slice(view_offsets[i], view_offsets[i + 1])
         J = rows[part].reshape(-1, d)
         B[i], g_view[i] = J.T @ J, J.T @ errors[part].ravel()
-    upper = [(a, b) for a in range(3) for b in range(a, 3)]
-    products = np.empty((len(r), 9))
-    for column, (a, b) in enumerate(upper):
-        products[:, column] = J_point[:, 0, a] * J_point[:, 0, b] + J_point[:, 1, a] * J_point[:, 1, b]
-    products[:, 6:] = J_point[:, 0] * r[:, :1] + J_point[:, 1] * r[:, 1:]
-    sums = sum_by_point(products, offsets)
-    C = np.empty((len(sums), 3, 3))
-    for column, (a, b) in enumerate(upper):
-        C[:, a, b] = C[:, b, a] = sums[:, column]
-    return B, g_view, C, sums[:, 6:], W
+    pairs = np.matmul(np.swapaxes(J_point, 1, 2), np.concatenate([J_point, r[:, :, None]], 2))
+    sums = sum_by_point(pairs.reshape(-1, 12), offsets).reshape(-1, 3, 4)
+    return B, g_view, np.ascontiguousarray(sums[:, :, :3]), np.ascontiguousarray(sums[:, :, 3]), W
 
 
 def _weighted(at: Linearised, U: Array) -> tuple[Array, Array, Array]:

@@ -3,55 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.estimation import least_squares
 from vslam_ref.estimation.bundle.problem import BundleProblem
+from vslam_ref.estimation.least_squares import Iteration
+from vslam_ref.estimation.least_squares.result import CONVERGED
 
-Reason = Literal[
-    "cost",
-    "gradient",
-    "max_iterations",
-    "stalled",
-    "no_observations",
-    "no_images",
-    "all_outliers",
-    "nothing_free",
-    "not_finite",
-]
-CONVERGED: tuple[Reason, ...] = ("cost", "gradient")
-
-
-class Iteration(NamedTuple):
-    """One step that was tried.
-
-    Attributes
-    ----------
-    cost : float
-        After the step, at the scale ``sigma``; that before it where it was refused.
-    decrease : float
-        Of the cost, at that scale; what was refused is negative or NaN.
-    gradient_norm : float
-        Largest cosine between a column of the Jacobian and the residuals before the step, in [0, 1].
-    step_norm : float
-        Length of the step in the metric of the damping: to first order, pixels by which residuals change.
-    damping : float
-    gain : float
-        Decrease over the promised one.
-    accepted : bool
-    sigma : float
-    """
-
-    cost: float
-    decrease: float
-    gradient_norm: float
-    step_norm: float
-    damping: float
-    gain: float
-    accepted: bool
-    sigma: float
+Reason = least_squares.Reason | Literal["no_observations", "no_images", "all_outliers", "nothing_free"]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where everything stands in the linear system: orders, columns, chunks; computed once a problem.
+"""Where everything stands in the linear system: orders and columns; computed once a problem.
 
 The system of one step has an arrow's shape.  With the views first and the points last::
 
@@ -19,7 +19,6 @@ columns.  Observations are sorted by point, then shared lens, then view.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,31 +26,6 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.estimation.bundle.projection import Links, State
 from vslam_ref.estimation.bundle.weights import whitener
-
-CHUNK_ENTRIES = 100_000
-"""Rows times columns that the dense window of a chunk should not exceed: it then stays in the cache."""
-CHUNK_POINTS = (100, 400)
-"""Fewest points of a chunk, so that adding its result costs less than its product; and most."""
-
-
-class Windows(NamedTuple):
-    """Chunks of points, each with the columns of the reduced system that it touches.
-
-    Attributes
-    ----------
-    points : ndarray, shape (m + 1,)
-        Chunk c holds the points ``points[c]`` to ``points[c + 1]``.
-    offsets : ndarray, shape (m + 1,)
-        Its columns are ``columns[offsets[c]:offsets[c + 1]]``, rising; the last one is the waste column.
-    columns : ndarray
-    local : ndarray, shape (n, d)
-        Position within its chunk's columns of each column of an observation.
-    """
-
-    points: IntArray
-    offsets: IntArray
-    columns: IntArray
-    local: IntArray
 
 
 @dataclass(frozen=True)
@@ -71,8 +45,6 @@ class Structure:
     has_cov : bool
     offsets : ndarray, shape (N + 1,)
         Observations of sorted point j are ``offsets[j]`` to ``offsets[j + 1]``.
-    runs : ndarray
-        First observation of each run with the same point and the same columns of the lens.
     view_order, view_offsets : ndarray, shapes (n,) and (V + 1,)
         Sorted observations gathered by view.
     columns : ndarray, shape (V, d)
@@ -84,7 +56,6 @@ class Structure:
         Largest distance of two columns before the border that share a point.
     free_point : ndarray, shape (N,)
         Of the sorted points.
-    windows : Windows
     """
 
     order: IntArray
@@ -93,7 +64,6 @@ class Structure:
     whitener: Array
     has_cov: bool
     offsets: IntArray
-    runs: IntArray
     view_order: IntArray
     view_offsets: IntArray
     columns: IntArray
@@ -101,7 +71,6 @@ class Structure:
     border: int
     bandwidth: int
     free_point: BoolArray
-    windows: Windows
 
     def whitened(self, r: Array) -> Array:
         """Residuals (n, 2) of the sorted observations, in standard deviations."""
@@ -141,7 +110,6 @@ def structure(problem: BundleProblem) -> Structure:
         whitener=_whitener(problem.seen)[order],
         has_cov=seen.cov_uv is not None,
         offsets=offsets,
-        runs=_runs(links, columns, border, size),
         view_order=view_order,
         view_offsets=view_offsets,
         columns=columns,
@@ -149,7 +117,6 @@ def structure(problem: BundleProblem) -> Structure:
         border=border,
         bandwidth=_bandwidth(links, columns, border, offsets),
         free_point=problem.free.point[point_order],
-        windows=_windows(links, columns, size, offsets),
     )
 
 
@@ -200,15 +167,6 @@ def _whitener(seen: Observations) -> Array:
     return whitener(seen.cov_uv)
 
 
-def _runs(links: Links, columns: IntArray, border: int, size: int) -> IntArray:
-    """Starts of runs of observations that share point and border columns; every one without a border."""
-    n = len(links.view)
-    if border == size or n == 0:
-        return np.arange(n)
-    new = (np.diff(links.point) != 0) | (np.diff(links.lens) != 0)
-    return np.concatenate([[0], np.flatnonzero(new) + 1])
-
-
 def _bandwidth(links: Links, columns: IntArray, border: int, offsets: IntArray) -> int:
     """Largest distance of two columns before the border that meet at a point or in a view."""
     inside = columns < border
@@ -221,31 +179,3 @@ def _bandwidth(links: Links, columns: IntArray, border: int, offsets: IntArray) 
         last = np.maximum.reduceat(high[links.view], starts)
         widest = max(widest, int((last - first).max()))
     return max(widest, 0)
-
-
-def _windows(links: Links, columns: IntArray, size: int, offsets: IntArray) -> Windows:
-    """Cut the points into chunks whose dense window stays small."""
-    points = len(offsets) - 1
-    local = np.empty((len(links.view), columns.shape[1]), dtype=np.int64)
-    bounds, ends, parts = [0], [0], []
-    while bounds[-1] < points:
-        begin = bounds[-1]
-        end = min(points, begin + CHUNK_POINTS[1])
-        used = _touched(links, columns, size, offsets[begin], offsets[end])
-        fitting = max(CHUNK_POINTS[0], CHUNK_ENTRIES // (3 * len(used)))
-        if end - begin > fitting:
-            end = begin + fitting
-            used = _touched(links, columns, size, offsets[begin], offsets[end])
-        part = slice(offsets[begin], offsets[end])
-        local[part] = np.searchsorted(used, columns[links.view[part]])
-        parts.append(used)
-        bounds.append(end)
-        ends.append(ends[-1] + len(used))
-    joined = np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
-    return Windows(np.array(bounds), np.array(ends), joined.astype(np.int64), local)
-
-
-def _touched(links: Links, columns: IntArray, size: int, begin: int, end: int) -> IntArray:
-    """Columns of a range of observations, rising, the waste column last."""
-    views = np.unique(links.view[begin:end])
-    return np.unique(np.append(columns[views].ravel(), size))

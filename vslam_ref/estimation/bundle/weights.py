@@ -102,7 +102,7 @@ def weigh(robust: Robust, sigma: float, errors: Array, valid: BoolArray) -> Weig
     """
     loss = robust.loss.scaled(sigma) if math.isfinite(sigma) else L2()
     if isinstance(loss, L2):
-        costs = 0.5 * np.einsum("ni,ni->n", errors, errors)
+        costs = 0.5 * np.einsum("ni,ni->n", errors, errors)  # eq-reprojection-sum
         return Weighted(np.where(valid, costs, np.inf), valid.astype(np.float64), sigma)
     sizes = np.hypot(errors[:, 0], errors[:, 1])
     worst = most(loss)

@@ -3,6 +3,7 @@
 ==================  ==========================================================================
 module              holds
 ==================  ==========================================================================
+``book``            the algorithm of the chapter, to be read
 ``board``           the board, its corners in each view
 ``homography``      board plane to image, by the normalised direct linear transform
 ``zhang``           sensor from homographies, pose from a homography
@@ -14,11 +15,10 @@ module              holds
 ``robustly``        the same with a robust loss, for corners some of which are wrong
 ``result``          what comes back; covariance; what the corners do not determine
 ``ptam``            the step of PTAM's calibrator, as it was
-``simulated``       boards in front of a known camera
 ==================  ==========================================================================
 """
 
-from vslam_ref.estimation.calibration import ptam, simulated
+from vslam_ref.estimation.calibration import book, ptam
 from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
 from vslam_ref.estimation.calibration.homography import apply_homography, homography
@@ -42,6 +42,7 @@ __all__ = [
     "State",
     "View",
     "apply_homography",
+    "book",
     "calibrate",
     "calibrate_robustly",
     "find_start",
@@ -51,7 +52,6 @@ __all__ = [
     "ptam",
     "reduce",
     "sensor_from_homographies",
-    "simulated",
     "stack",
     "tilt",
 ]

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
-
-IntArray = NDArray[np.intp]
+from vslam_ref.arrays import Array, IntArray
 
 LEAST_CORNERS = 4
 """A homography has 8 numbers, a corner gives 2."""

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.calibration.arrow import Arrow, arrow
+from vslam_ref.estimation.calibration.arrow import Arrow, Blocks, arrow, damped_step, promised
 from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
+from vslam_ref.estimation.least_squares import Step
 from vslam_ref.estimation.robust import Loss
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Lens, projection
@@ -51,6 +52,12 @@ class Point(NamedTuple):
         Of the loss; ones without.
     normal : Arrow
         The normal equations.
+    scale : Blocks
+        Metric D of a step: lengths of the Jacobian's columns.
+    gradient_norm : float
+        Largest cosine between a column of the Jacobian and the residual; 0 for no residual.
+    stiffness : float
+        1: in the metric D all columns are as long.
     """
 
     state: State
@@ -58,22 +65,14 @@ class Point(NamedTuple):
     costs: Array
     weights: Array
     normal: Arrow
+    scale: Blocks
+    gradient_norm: float
+    stiffness: float = 1.0
 
     @property
     def cost(self) -> float:
         """Sum of the costs."""
         return float(self.costs.sum())
-
-    @property
-    def cosine(self) -> float:
-        """Largest cosine between a column of the Jacobian and the residual; 0 for no residual."""
-        length = float(np.sqrt((self.weights * (self.residual**2).sum(-1)).sum()))
-        scale = self.normal.lengths()
-        slope = max(
-            float(np.abs(self.normal.g_pose / scale.pose).max(initial=0.0)),
-            float(np.abs(self.normal.g_free / scale.free).max(initial=0.0)),
-        )
-        return slope / length if length > 0 else 0.0
 
 
 def residual(
@@ -119,22 +118,24 @@ def residual_with_jacobians(
 
 @dataclass(frozen=True)
 class Problem:
-    """Corners, a camera model with its free parameters, and a loss."""
+    """Corners, a camera model with its free parameters, and a loss: what a descent asks of a calibration."""
 
     corners: Corners
     free: Free
     loss: Loss
 
-    def costs(self, state: State) -> Array | None:
-        """Cost of each corner (M,), or None where the state is no camera that sees them all."""
-        if not self._is_camera(state):
-            return None
+    def costs(self, state: State) -> Array:
+        """Cost of each corner (M,); infinite where the camera does not see it.
+
+        Implements :eq:`eq-calibration-cost`, term by term.
+        """
         c = self.corners
         r = residual(state.params, state.T_cam_board[c.view], c.X_board, c.uv, lens=self.free.model.lens)
-        return self.loss.cost(np.linalg.norm(r, axis=1)) if np.isfinite(r).all() else None
+        length = np.linalg.norm(r, axis=1)
+        return np.where(np.isfinite(length), self.loss.cost(length), np.inf)
 
-    def at(self, state: State) -> Point | None:
-        """Linearise, or None where :meth:`costs` is None."""
+    def linearise(self, state: State, before: Point | None = None) -> Point | None:
+        """Costs and normal equations, or None where the state is no camera that sees all corners."""
         if not self._is_camera(state):
             return None
         c = self.corners
@@ -146,11 +147,29 @@ class Problem:
         length = np.linalg.norm(r, axis=1)
         weights = self.loss.weight(length)
         normal = arrow(J_pose, J_intrinsics @ self.free.basis, r, weights, c.first)
-        return Point(state, r, self.loss.cost(length), weights, normal)
+        scale, size = normal.lengths(), float(np.sqrt(weights @ length**2))
+        slopes = (normal.g_pose / scale.pose, normal.g_free / scale.free)
+        slope = max(float(np.abs(g).max(initial=0.0)) for g in slopes) / size if size > 0 else 0.0
+        return Point(state, r, self.loss.cost(length), weights, normal, scale, slope)
 
-    def plus(self, state: State, pose: Array, free: Array) -> State:
+    def step(self, here: Point, damping: float) -> Step | None:
+        """Damped step of poses and intrinsics, by elimination of the poses."""
+        change = damped_step(here.normal, damping, here.scale)
+        if change is None:
+            return None
+        length = Blocks(here.scale.pose * change.pose, here.scale.free * change.free).norm
+        promise = promised(here.normal, change, damping, here.scale)
+        return Step(change, length, promise, length / here.scale.norm)
+
+    def move(self, here: Point, step: Step) -> State | None:
+        """State after a step; None where its intrinsics make no camera."""
+        there = self.plus(here.state, step.change)
+        return there if self._is_camera(there) else None
+
+    def plus(self, state: State, change: Blocks) -> State:
         """Step: T <- Exp(xi) T for each pose, and a sum for the intrinsics."""
-        return State(state.params + self.free.basis @ free, se3.perturb(state.T_cam_board, pose))
+        T = se3.perturb(state.T_cam_board, change.pose)
+        return State(state.params + self.free.basis @ change.free, T)
 
     def _is_camera(self, state: State) -> bool:
         try:

@@ -48,4 +48,4 @@ def ptam_step(problem: Problem, here: Point, size: tuple[int, int]) -> State:
     step = damped_step(here.normal, PRIOR, Blocks(np.ones_like(here.normal.g_pose), scale))
     if step is None:
         raise ValueError("the normal equations are singular")
-    return problem.plus(here.state, SHARE * step.pose, SHARE * step.free)
+    return problem.plus(here.state, Blocks(SHARE * step.pose, SHARE * step.free))  # eq-ptam-step

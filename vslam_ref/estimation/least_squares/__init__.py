@@ -11,34 +11,45 @@ One iteration, in this order:
 ==================  ==========================================================================
 module              holds
 ==================  ==========================================================================
-``problem``         residuals and Jacobians, given or numeric; the robust loss; bad values
+``book``            the algorithm of the chapter, to be read
+``descend``         the loop, and the reasons to end it; shared by every solver of the package
+``questions``       what the loop asks of a problem
+``options``         when it ends
 ``damping``         Nielsen's rule, Ceres' trust region, and none at all (Gauss-Newton)
+``problem``         residuals and Jacobians, given or numeric; the robust loss; bad values
 ``linear``          the damped step by QR, and covariances
-``solver``          the loop, and the reasons to end it
+``solver``          ``minimise``: a problem, descended
 ``result``          what comes back: solution, reason, history
-``regressions``     fifteen model functions of NIST's certified problems, with Jacobians
 ==================  ==========================================================================
 """
 
 from vslam_ref.estimation.least_squares.damping import Ceres, Damping, Nielsen, Undamped
+from vslam_ref.estimation.least_squares.descend import Descent, descend
 from vslam_ref.estimation.least_squares.linear import Covariance, covariance, damped_step
+from vslam_ref.estimation.least_squares.options import Options
 from vslam_ref.estimation.least_squares.problem import Problem, numeric_jacobian
+from vslam_ref.estimation.least_squares.questions import Linearised, Questions, Step
 from vslam_ref.estimation.least_squares.result import Iteration, Reason, Solution
-from vslam_ref.estimation.least_squares.solver import Options, minimise
+from vslam_ref.estimation.least_squares.solver import minimise
 
 __all__ = [
     "Ceres",
     "Covariance",
     "Damping",
+    "Descent",
     "Iteration",
+    "Linearised",
     "Nielsen",
     "Options",
     "Problem",
+    "Questions",
     "Reason",
     "Solution",
+    "Step",
     "Undamped",
     "covariance",
     "damped_step",
+    "descend",
     "minimise",
     "numeric_jacobian",
 ]

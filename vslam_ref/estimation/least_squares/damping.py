@@ -27,7 +27,6 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.least_squares.linear import column_lengths
 
 Scaling = Literal["largest", "columns", "none"]
 
@@ -46,11 +45,11 @@ class Damping(Protocol):
     def downhill_only(self) -> bool:
         """Whether a step that does not decrease the cost is refused."""
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
-        """Diagonal of D, (n,), > 0; ``before`` is that of the step before, None at the start."""
+    def scale(self, lengths: Array, before: Array | None) -> Array:
+        """Diagonal of D, (n,), > 0, from the lengths of J's columns; ``before`` is the last D."""
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
-        """Damping of the first step."""
+    def first(self, stiffness: float) -> DampingState:
+        """Damping of the first step; ``stiffness`` is the square of the longest column in the metric D."""
 
     def success(self, state: DampingState, gain: float) -> DampingState:
         """Damping after an accepted step."""
@@ -72,8 +71,24 @@ def gain_factor(gain: float) -> float:
     return max(1.0 / 3.0, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3)
 
 
+class _Gradual:
+    """Nielsen's change of lambda after a success and after failures, between two bounds."""
+
+    downhill_only = True
+    least, most = 0.0, 1e100
+
+    def success(self, state: DampingState, gain: float) -> DampingState:
+        """Shrink by the gain."""
+        return DampingState(max(state.value * gain_factor(gain), self.least), 2.0)
+
+    def failure(self, state: DampingState) -> DampingState | None:
+        """Grow by 2, 4, 8 …; give up where every step has become nothing."""
+        grown = DampingState(state.value * state.growth, 2.0 * state.growth)
+        return grown if grown.value <= self.most else None
+
+
 @dataclass(frozen=True)
-class Nielsen:
+class Nielsen(_Gradual):
     """Nielsen's rule.
 
     Parameters
@@ -88,35 +103,20 @@ class Nielsen:
     tau: float = 1e-3
     scaling: Scaling = "largest"
 
-    @property
-    def downhill_only(self) -> bool:
-        """True."""
-        return True
-
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths or ones."""
         if self.scaling == "none":
-            return np.ones(jacobian.shape[1])
-        now = column_lengths(jacobian)
-        return now if before is None or self.scaling == "columns" else np.maximum(now, before)
+            return np.ones(len(lengths))
+        return lengths if before is None or self.scaling == "columns" else np.maximum(lengths, before)
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """Tau times the largest scaled diagonal entry of J^T J."""
-        return DampingState(self.tau * float(np.max(column_lengths(jacobian) / scale) ** 2), 2.0)
-
-    def success(self, state: DampingState, gain: float) -> DampingState:
-        """Shrink by the gain."""
-        return DampingState(state.value * gain_factor(gain), 2.0)
-
-    def failure(self, state: DampingState) -> DampingState | None:
-        """Grow by 2, 4, 8 …; give up where every step has become nothing."""
-        grown = DampingState(state.value * state.growth, 2.0 * state.growth)
-        return grown if grown.value < 1e100 else None
+        return DampingState(self.tau * stiffness, 2.0)
 
 
 @dataclass(frozen=True)
-class Ceres:
-    """Trust region as in Ceres: radius = 1/lambda in a metric of the columns.
+class Ceres(_Gradual):
+    """Trust region as in Ceres: radius = 1/lambda, 1e-32 to 1e16, in a metric of the columns.
 
     Parameters
     ----------
@@ -125,44 +125,28 @@ class Ceres:
     """
 
     radius: float = 1e4
+    least, most = 1e-16, 1e32
 
-    @property
-    def downhill_only(self) -> bool:
-        """True."""
-        return True
-
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths, clipped as the roots of Ceres' 1e-6 and 1e32."""
-        return np.clip(column_lengths(jacobian), 1e-3, 1e16)
+        return np.clip(lengths, 1e-3, 1e16)
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """One over the first radius."""
         return DampingState(1.0 / self.radius, 2.0)
-
-    def success(self, state: DampingState, gain: float) -> DampingState:
-        """Widen the region by the gain, to 1e16 at most."""
-        return DampingState(max(state.value * gain_factor(gain), 1e-16), 2.0)
-
-    def failure(self, state: DampingState) -> DampingState | None:
-        """Shrink the region by 2, 4, 8 …; give up below 1e-32."""
-        grown = DampingState(state.value * state.growth, 2.0 * state.growth)
-        return grown if grown.value <= 1e32 else None
 
 
 @dataclass(frozen=True)
 class Undamped:
     """Gauss-Newton: lambda is 0, every step is taken, uphill too."""
 
-    @property
-    def downhill_only(self) -> bool:
-        """False."""
-        return False
+    downhill_only = False
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Column lengths; without damping they change rounding only."""
-        return column_lengths(jacobian)
+        return lengths
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """Zero."""
         return DampingState(0.0, 2.0)
 

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.least_squares.linear import EPS, column_lengths
+from vslam_ref.estimation.least_squares.damping import Damping, Nielsen
+from vslam_ref.estimation.least_squares.linear import EPS, column_lengths, damped_step
+from vslam_ref.estimation.least_squares.questions import Step
 from vslam_ref.estimation.robust import L2, Loss
 
 Function = Callable[[Any], ArrayLike]
@@ -24,7 +26,20 @@ Plus = Callable[[Array, Array], Array]
 
 
 class Point(NamedTuple):
-    """Everything known at one x: arrays over m residuals and n coordinates of a step."""
+    """Everything known at one x.
+
+    Attributes
+    ----------
+    x : ndarray
+    residual, costs, weights : ndarray, shapes (m,), (m / block,), (m,)
+    jacobian : ndarray, shape (m, n)
+    rows, target : ndarray, shapes (m, n), (m,)
+        Jacobian and residual, multiplied by the roots of the weights.
+    scale : ndarray, shape (n,)
+        Diagonal of D.
+    gradient_norm, stiffness : float
+        As in :class:`~vslam_ref.estimation.least_squares.questions.Linearised`.
+    """
 
     x: Array
     residual: Array
@@ -33,7 +48,9 @@ class Point(NamedTuple):
     jacobian: Array
     rows: Array
     target: Array
+    scale: Array
     gradient_norm: float
+    stiffness: float
 
 
 def add(x: Array, step: Array) -> Array:
@@ -60,6 +77,8 @@ class Problem:
         ``plus(x, step)``; for poses the left perturbation, for vectors the sum.
     coordinates : int, optional
         Length n of a step, for a numeric Jacobian where it is not the length of x.
+    damping : Damping
+        Its metric D.
     """
 
     residual: Function
@@ -68,6 +87,7 @@ class Problem:
     block: int = 1
     plus: Plus = add
     coordinates: int | None = None
+    damping: Damping = field(default_factory=Nielsen)
 
     def residual_at(self, x: Array) -> Array:
         """Residual (m,), finite or not.
@@ -83,24 +103,49 @@ class Problem:
             raise ValueError(f"residual {r.shape}: need (m,) with m a multiple of {self.block}")
         return r
 
-    def costs(self, residual: Array) -> Array:
-        """Cost of each block, (m / block,)."""
-        with np.errstate(all="ignore"):
-            return self.loss.cost(self._sizes(residual))
+    def costs(self, x: Array) -> Array:
+        """Cost of each block, (m / block,), finite or not."""
+        return self._costs(self.residual_at(x))
 
-    def at(self, x: Array) -> Point | None:
-        """Residual, weights and Jacobian at x; None where one of them is not finite."""
+    def linearise(self, x: Array, before: Point | None = None) -> Point | None:
+        """Residual, weights and Jacobian at x; None where one of them is not finite.
+
+        Implements :eq:`eq-linearised` and :eq:`eq-reweighted`.
+        """
         residual, jacobian = self._linearise(x)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return None
-        sizes = self._sizes(residual)
+        sizes, costs = self._sizes(residual), self._costs(residual)
+        if not np.isfinite(costs.sum()):
+            return None
         weights = np.repeat(self.loss.weight(sizes), self.block)
         root = np.repeat(self.loss.sqrt_weight(sizes), self.block)
         rows, target = jacobian * root[:, None], residual * root
-        costs = self.costs(residual)
-        if not np.isfinite(costs.sum()):
+        lengths = column_lengths(rows)
+        scale = self.damping.scale(lengths, None if before is None else before.scale)
+        slope, stiffness = (
+            gradient_norm(rows, target, lengths),
+            float(np.max(lengths / scale, initial=0.0)) ** 2,
+        )
+        return Point(x, residual, costs, weights, jacobian, rows, target, scale, slope, stiffness)
+
+    def step(self, here: Point, damping: float) -> Step | None:
+        """Damped step and its promise, the denominator of :eq:`eq-gain-ratio`."""
+        change = damped_step(here.rows, here.target, damping, here.scale)
+        if change is None:
             return None
-        return Point(x, residual, costs, weights, jacobian, rows, target, gradient_norm(rows, target))
+        length = float(np.linalg.norm(here.scale * change))
+        size = here.scale * here.x if self.plus is add else here.scale
+        promised = 0.5 * float(np.sum((here.rows @ change) ** 2)) + damping * length**2  # eq-gain-ratio
+        return Step(change, length, promised, length / max(float(np.linalg.norm(size)), 1e-300))
+
+    def move(self, here: Point, step: Step) -> Array:
+        """Return x after a step."""
+        return self.plus(here.x, step.change)
+
+    def _costs(self, residual: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return self.loss.cost(self._sizes(residual))
 
     def _sizes(self, residual: Array) -> Array:
         """Residuals (m,), or norms of blocks (m / block,)."""
@@ -124,7 +169,7 @@ class Problem:
         return residual, jacobian
 
 
-def gradient_norm(rows: Array, target: Array) -> float:
+def gradient_norm(rows: Array, target: Array, lengths: Array) -> float:
     """Largest cosine between a column of the Jacobian and the residual; 0 where one of them is zero.
 
     It has no unit, so one threshold serves pixels and metres.
@@ -132,7 +177,7 @@ def gradient_norm(rows: Array, target: Array) -> float:
     length = float(np.linalg.norm(target))
     if length == 0.0 or rows.size == 0:
         return 0.0
-    return float(np.abs((rows / column_lengths(rows)).T @ (target / length)).max())
+    return float(np.abs((rows / lengths).T @ (target / length)).max())
 
 
 def numeric_jacobian(

@@ -21,23 +21,29 @@ class Iteration(NamedTuple):
     ----------
     cost : float
         After the step; the old cost where it was refused.
-    damping : float
-        lambda of this step.
-    step_norm : float
-        Length of the step in the metric D.
+    decrease : float
+        Of the cost; of a refused step what it would have been, negative or NaN; NaN below rounding, too.
     gradient_norm : float
         Largest cosine between a column of J and r *before* the step, in [0, 1].
+    step_norm : float
+        Length of the step in the metric D.
+    damping : float
+        lambda of this step.
     gain : float
         Actual over promised decrease; NaN where the trial had no finite cost or both are rounding.
     accepted : bool
+    sigma : float
+        Scale of the errors at which the step was judged, where a scale is found as the descent goes.
     """
 
     cost: float
-    damping: float
-    step_norm: float
+    decrease: float
     gradient_norm: float
+    step_norm: float
+    damping: float
     gain: float
     accepted: bool
+    sigma: float = 1.0
 
 
 @dataclass(frozen=True)

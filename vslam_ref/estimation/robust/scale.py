@@ -42,6 +42,7 @@ class Scale(NamedTuple):
 def small_sample_factor(measurements: int, parameters: int) -> float:
     r"""Factor on a median scale for residuals of a fitted model: 1 + 5/(measurements - parameters).
 
+    Implements the factor of :eq:`eq-small-sample`.
     Residuals of a fit are smaller than errors, because the fit went to meet them.
 
     Parameters
@@ -79,6 +80,8 @@ def small_sample_factor(measurements: int, parameters: int) -> float:
 def mad_scale(errors: ArrayLike, *, parameters: int | None = None) -> Scale:
     """Scale of scalar errors: 1.4826 times their median size.
 
+    Implements :eq:`eq-mad`.
+
     Parameters
     ----------
     errors : array_like, shape (N,)
@@ -115,6 +118,8 @@ def mad_scale(errors: ArrayLike, *, parameters: int | None = None) -> Scale:
 
 def norm_scale(errors: ArrayLike, *, parameters: int | None = None) -> Scale:
     """Scale of plane errors: 0.8493 times their median norm.
+
+    Implements :eq:`eq-mad-norm`.
 
     Parameters
     ----------

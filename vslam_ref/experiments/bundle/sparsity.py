@@ -24,9 +24,9 @@ from vslam_ref.experiments.bundle.elimination import (
     factor_pattern,
     point_cost,
 )
-from vslam_ref.experiments.bundle.scene import INTRINSICS, make_bundle
-from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Pinhole, projection
+from vslam_ref.geometry.cameras import Pinhole
+from vslam_ref.worlds import bundles
+from vslam_ref.worlds.bundles import make_bundle
 
 BAL_FILE = "problem-16-22106-pre.txt.bz2"
 
@@ -148,15 +148,8 @@ def with_points(problem: BundleProblem, chosen: IntArray) -> BundleProblem:
 
 
 def walk(views: int, config: SparsityConfig) -> BundleProblem:
-    """A camera that walks along a wall; its pictures have lost their order."""
-    rng = np.random.default_rng([config.seed, views])
-    place = rng.permutation(views)
-    T = se3.from_rt(np.eye(3), np.stack([-0.5 * place, np.zeros(views), np.zeros(views)], -1))
-    n = config.points_per_view * views
-    X = rng.uniform([-1.0, -1.0, 3.5], [0.5 * views + 0.5, 1.0, 4.5], (n, 3))
-    view, point = np.nonzero(np.abs(0.5 * place[:, None] - X[None, :, 0]) < config.reach)
-    uv = projection.pixel_from_world(np.array(INTRINSICS), T[view], X[point], lens=Pinhole.lens).uv
-    return BundleProblem(Pinhole, Scene(T, X, np.array([INTRINSICS])), Observations(view, point, uv))
+    """A camera that walks along a wall."""
+    return bundles.walk(views, config.seed, config.points_per_view, config.reach)
 
 
 def point_columns(problem: BundleProblem) -> tuple[IntArray, int]:

@@ -12,18 +12,17 @@ from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.least_squares import Options, minimise
 from vslam_ref.estimation.resection import Resection, refine_pose, refine_pose_robust
 from vslam_ref.estimation.robust import mad_scale, tuned
+from vslam_ref.estimation.triangulation import Triangulation, triangulate
 from vslam_ref.experiments.multiview.scene import MultiviewConfig, World, moved
 from vslam_ref.geometry import camera_pose, se3, so3
 from vslam_ref.geometry.cameras import Camera, Pinhole, WorldProjectionJacobians
 from vslam_ref.geometry.multiview import (
-    Triangulation,
     Views,
     epipolar_distance,
     essential_from_motion,
     fundamental_from_essential,
     relative_motion,
     sampson_distance,
-    triangulate,
 )
 
 

@@ -3,20 +3,22 @@
 =======================  ==========================================================================
 module                   holds
 =======================  ==========================================================================
+``book``                 the algorithms for one point or camera, to be read
 ``views``                cameras and poses as arrays over views; rays and pixels of all of them
 ``epipolar``             what a point in one image says about the other
 ``closest_point``        where two rays pass closest, with exact Jacobians
-``triangulation``        points from any number of views: linear, then optimal, with covariance
+``triangulation``        points from any number of views, by linear equations
 ``two_view_optimum``     the global optimum for two views, from a polynomial of degree six
 ``three_points``         every camera that sees three points where they were seen (P3P)
 ``resection``            a camera from six points and more, or four of a plane, by linear equations
 =======================  ==========================================================================
 
-Point sets are aligned by :mod:`vslam_ref.geometry.alignment`.  A pose is refined by
-:mod:`vslam_ref.estimation.resection`, one floor up, where Levenberg-Marquardt and the robust losses live.
+Point sets are aligned by :mod:`vslam_ref.geometry.alignment`.  What minimises a cost in pixels is one floor
+up: points in :mod:`vslam_ref.estimation.triangulation`, poses in :mod:`vslam_ref.estimation.resection`.
 """
 
 from vslam_ref.geometry.alignment import Alignment, align
+from vslam_ref.geometry.multiview import book, three_points
 from vslam_ref.geometry.multiview.closest_point import midpoint, midpoint_with_jacobians
 from vslam_ref.geometry.multiview.epipolar import (
     epipolar_distance,
@@ -35,20 +37,21 @@ from vslam_ref.geometry.multiview.resection import (
     tilted_twin,
 )
 from vslam_ref.geometry.multiview.three_points import ThreePointPoses, p3p
-from vslam_ref.geometry.multiview.triangulation import Triangulation, triangulate, triangulate_linear
+from vslam_ref.geometry.multiview.triangulation import LinearPoints, triangulate_linear
 from vslam_ref.geometry.multiview.two_view_optimum import CorrectedPair, correct_pair
 from vslam_ref.geometry.multiview.views import Views
 
 __all__ = [
     "Alignment",
     "CorrectedPair",
+    "LinearPoints",
     "LinearPose",
     "PointState",
     "PoseState",
     "ThreePointPoses",
-    "Triangulation",
     "Views",
     "align",
+    "book",
     "correct_pair",
     "dlt",
     "epipolar_distance",
@@ -61,7 +64,7 @@ __all__ = [
     "relative_motion",
     "resect_linear",
     "sampson_distance",
+    "three_points",
     "tilted_twin",
-    "triangulate",
     "triangulate_linear",
 ]

@@ -1,34 +1,27 @@
-r"""Points from two views or more: linear first, then with the smallest reprojection error.
+r"""Points from two views or more, by linear equations.
 
-**Linear.**  Camera i sees X along the unit bearing b.  Both are parallel, so the part of
+Camera i sees X along the unit bearing b.  Both are parallel, so the part of
 :math:`X_{cam} = R_i X + t_i` across b vanishes.  With :math:`N_b` (2, 3), two unit vectors across b,
 
 .. math:: N_{b_i} \,[R_i \; t_i] \begin{bmatrix} X \\ 1 \end{bmatrix} = 0 ,
 
 two rows a view for four homogeneous numbers.  Bearings, not pixels: any lens will do.
 
-**Optimal.**  The linear rows measure distances from rays; the noise is in pixels.  From the linear point
-Levenberg-Marquardt goes to the minimum of
-
-.. math:: c(X) = \tfrac12 \sum_i \lVert h(C_i, X) - u_i \rVert^2 / \sigma_i^2 ,
-
-and the inverse of its Gauss-Newton Hessian :math:`H = \sum_i J_i^T J_i / \sigma_i^2` is the covariance of X.
+The rows measure distances from rays; the noise is in pixels.  The point with the smallest reprojection error
+is one floor up, in :mod:`vslam_ref.estimation.triangulation`, and starts from here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, as_array, times
 from vslam_ref.geometry import camera_pose, se3
-from vslam_ref.geometry.multiview._descent import descend
 from vslam_ref.geometry.multiview._rays import across, largest_angle
 from vslam_ref.geometry.multiview.point_state import PointState, StateArray
-from vslam_ref.geometry.multiview.views import Views
 
 MIN_PARALLAX = float(np.radians(1.0))
 """Parallax, radians, below which a point is flagged: its depth is then known to some 60 pixel-angles.
@@ -49,44 +42,6 @@ class LinearPoints(NamedTuple):
     X_world: Array
     state: StateArray
     parallax: Array
-
-
-@dataclass(frozen=True)
-class Triangulation:
-    """Optimal points.
-
-    Attributes
-    ----------
-    X_world : ndarray, shape (N, 3)
-        Always finite.  The linear point where ``state`` forbids a refinement, and the origin where there
-        is no point at all (``TOO_FEW``, ``NO_RAY``, ``NO_DEPTH``).
-    state : ndarray, shape (N,)
-        :class:`~vslam_ref.geometry.multiview.point_state.PointState` of each point.
-    parallax : ndarray, shape (N,)
-        Largest angle between two of its rays, radians.
-    cov_X : ndarray, shape (N, 3, 3)
-        Covariance to first order; infinite on the diagonal where there is none.
-    rmse_px : ndarray, shape (N,)
-        Root of the mean squared distance in the images, pixels; infinite where the point was not refined.
-    iterations : ndarray, shape (N,)
-        Steps tried.
-    """
-
-    X_world: Array
-    state: StateArray
-    parallax: Array
-    cov_X: Array
-    rmse_px: Array
-    iterations: NDArray[np.int64]
-
-    @property
-    def ok(self) -> BoolArray:
-        """Which points may be used, (N,)."""
-        return np.asarray(self.state == PointState.OK)
-
-    def counts(self) -> dict[str, int]:
-        """How many points are in which state."""
-        return {s.name: int(np.count_nonzero(self.state == s)) for s in PointState if (self.state == s).any()}
 
 
 def triangulate_linear(
@@ -157,85 +112,6 @@ def triangulate_linear(
     return LinearPoints(X, state, parallax)
 
 
-def triangulate(
-    views: Views,
-    uv: ArrayLike,
-    mask: ArrayLike | None = None,
-    *,
-    sigma_px: ArrayLike = 1.0,
-    min_parallax: float = MIN_PARALLAX,
-    max_iterations: int = 50,
-) -> Triangulation:
-    """Points with the smallest reprojection error, and their covariance.
-
-    Implements :eq:`eq-triangulation-optimal` and :eq:`eq-triangulation-covariance`.
-
-    Parameters
-    ----------
-    views : Views
-        Cameras and poses.
-    uv : array_like, shape (N, V, 2)
-        Measured pixels.
-    mask : array_like of bool, shape (N, V), optional
-        Which of them count; all by default.
-    sigma_px : array_like, broadcast to (N, V)
-        Standard deviation of one coordinate of a pixel.
-    min_parallax : float
-        Flag points whose rays differ by less, radians.
-    max_iterations : int
-        Steps tried at most.
-
-    Returns
-    -------
-    Triangulation
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit, a pixel that counts is not finite, or a ``sigma_px`` is not positive.
-
-    Notes
-    -----
-    A step ends the search when it is shorter than 1e-8 standard deviations of the point itself.  Rays
-    with a small angle are refined too, and flagged.
-
-    Examples
-    --------
-    >>> from vslam_ref.geometry.cameras import Pinhole
-    >>> views = Views(Pinhole(500, 500, 320, 240), [se3.identity(), se3.exp([-1.0, 0, 0, 0, 0, 0])])
-    >>> found = triangulate(views, [[[320.0, 240.5], [220.0, 239.5]]], sigma_px=0.5)
-    >>> found.X_world.round(9) + 0.0, found.rmse_px.round(9).tolist(), found.counts()
-    (array([[0., 0., 5.]]), [0.5], {'OK': 1})
-    >>> np.sqrt(np.diag(found.cov_X[0])).round(4).tolist()  # depth: Z^2/(f B) sqrt(2) sigma
-    [0.005, 0.0035, 0.0354]
-    """
-    pixels = views._pixels(uv)
-    used = _mask(mask, pixels.shape[:2])
-    _refuse(used & ~np.isfinite(pixels).all(axis=-1), pixels, "pixel", "must be finite, or masked out")
-    sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), used.shape)
-    if not (np.isfinite(sigma) & (sigma > 0)).all():
-        raise ValueError("sigma_px must be finite and more than 0")
-    pixels = np.where(used[..., None], pixels, 0.0)
-    rays = views.rays(pixels)
-    start = triangulate_linear(views.T_cam_world, rays.bearing, used, min_parallax=min_parallax)
-    state = start.state.copy()
-    X = start.X_world.copy()
-    blind = (used & ~rays.valid).any(axis=1) & (state != PointState.TOO_FEW)
-    state[blind] = PointState.NO_RAY
-    X[blind] = 0.0
-    seen = (views.project(X).valid | ~used).all(axis=1)
-    go = np.flatnonzero(seen & ((state == PointState.OK) | (state == PointState.SMALL_PARALLAX)))
-    end = descend(views, pixels[go], np.where(used, 1.0 / sigma, 0.0)[go], X[go], max_iterations)
-    X[go] = end.X_world
-    state[~seen & (state == PointState.OK)] = PointState.NOT_CONVERGED  # outside a field: nowhere to start
-    state[go[~end.converged & (state[go] == PointState.OK)]] = PointState.NOT_CONVERGED
-    cov, rmse = np.tile(np.diag([np.inf] * 3), (len(X), 1, 1)), np.full(len(X), np.inf)
-    cov[go], rmse[go] = end.cov_X, end.rmse_px
-    iterations = np.zeros(len(X), dtype=np.int64)
-    iterations[go] = end.iterations
-    return Triangulation(X, state, start.parallax, cov, rmse, iterations)
-
-
 def _frame(T: Array) -> tuple[Array, float]:
     """Middle of the camera centres, and their spread; 1 if they are all at one place."""
     centres = camera_pose.centre_from_pose(T)
@@ -245,7 +121,14 @@ def _frame(T: Array) -> tuple[Array, float]:
     return middle, size if size > rounding else 1.0
 
 
-def _mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> BoolArray:
+def as_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> BoolArray:
+    """Mask of the given shape (N, V); all True where there is none.
+
+    Raises
+    ------
+    ValueError
+        If it has another shape, or is not bool.
+    """
     used = np.ones(shape, dtype=bool) if mask is None else np.asarray(mask)
     if used.shape != shape or used.dtype != bool:
         raise ValueError(f"mask is {used.dtype} of shape {used.shape}: need bool of {shape}")
@@ -257,13 +140,14 @@ def _checked(T: Array, bearings: ArrayLike, mask: ArrayLike | None) -> tuple[Arr
     b = as_array("bearings", bearings, 3)
     if T.ndim != 3 or b.ndim != 3 or b.shape[1] != len(T):
         raise ValueError(f"T_cam_world {T.shape} and bearings {b.shape}: need (V, 4, 4) and (N, V, 3)")
-    used = _mask(mask, b.shape[:2])
+    used = as_mask(mask, b.shape[:2])
     length = np.linalg.norm(np.where(used[..., None], b, np.array([0.0, 0.0, 1.0])), axis=-1)
-    _refuse(~(np.abs(length - 1.0) < 1e-6), b, "bearing", "must be a unit vector, or masked out")
+    refuse(~(np.abs(length - 1.0) < 1e-6), b, "bearing", "must be a unit vector, or masked out")
     return np.where(used[..., None], b, np.array([0.0, 0.0, 1.0])), used
 
 
-def _refuse(bad: BoolArray, values: Array, what: str, right: str) -> None:
+def refuse(bad: BoolArray, values: Array, what: str, right: str) -> None:
+    """Raise ValueError for the first bad value of (N, V, k), with what would be right."""
     if bad.any():
         n, v = np.argwhere(bad)[0]
         raise ValueError(f"{what} of point {n} in view {v} is {values[n, v].tolist()}: {right}")

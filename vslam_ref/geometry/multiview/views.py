@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array
-from vslam_ref.geometry import camera_pose, se3
+from vslam_ref.geometry import camera_pose
 from vslam_ref.geometry.cameras import Camera, Projection, Rays, WorldProjectionJacobians
 
 
@@ -73,7 +73,7 @@ class Views:
 
     def rays(self, uv: ArrayLike) -> Rays:
         """Unit bearings (N, V, 3) of pixels (N, V, 2), each in its camera's frame."""
-        uv = self._pixels(uv)
+        uv = self.pixels(uv)
         if isinstance(self.cameras, Camera):
             return self.cameras.unproject(uv)
         found = [camera.unproject(uv[:, i]) for i, camera in enumerate(self.each)]
@@ -104,13 +104,14 @@ class Views:
             np.zeros((*uv.shape, 0)),
         )
 
-    def depth_along_rays(self, bearings: Array, X_world: Array) -> Array:
-        """How far along each ray the point lies, b . X_cam, shape (N, V); negative behind the camera."""
-        X_cam = se3.act(self.T_cam_world, X_world[:, None])
-        depth: Array = np.einsum("nvi,nvi->nv", bearings, X_cam)
-        return depth
+    def pixels(self, uv: ArrayLike) -> Array:
+        """Pixels (N, V, 2) as an array.
 
-    def _pixels(self, uv: ArrayLike) -> Array:
+        Raises
+        ------
+        ValueError
+            If there is not one pixel a view.
+        """
         pixels = as_array("uv", uv, 2)
         if pixels.ndim != 3 or pixels.shape[1] != len(self):
             raise ValueError(f"uv has shape {pixels.shape}: need (N, {len(self)}, 2), one pixel a view")

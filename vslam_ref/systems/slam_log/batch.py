@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from vslam_ref.arrays import Array, IntArray
+from vslam_ref.estimation.least_squares import Ceres, Descent, Options, Step, descend
+from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.filters import observation
 from vslam_ref.geometry import se2, so2
 from vslam_ref.systems.slam_log import Calibration, LogRun, SlamLog, build_timeline
@@ -53,6 +55,10 @@ SENSOR_ONLY = ("sensor_ahead", "bearing_offset", "range_offset", "range_cosine")
 """Those that say nothing about odometry."""
 
 
+Place = tuple[Array, Array, Calibration]
+"""Poses (K, 3), landmarks (n, 2), and the calibration."""
+
+
 class Batch(NamedTuple):
     """A batch solution.
 
@@ -72,6 +78,7 @@ class Batch(NamedTuple):
     used : ndarray of bool, shape (N,)
         Normalised square under ``PLAUSIBLE``; for reports only.
     iterations : int
+        Steps tried.
     converged : bool
     free : tuple of str
     free_cov : ndarray, shape (f, f)
@@ -136,10 +143,45 @@ class _Problem:
         scale = np.array([calibration.sigma_range, calibration.sigma_bearing])
         return np.einsum("kij,kj->ki", whiten, e), s / scale
 
-    def cost(self, odometry: Array, sightings: Array) -> float:
-        """Return the whole cost of whitened residuals."""
-        squares = np.sum(sightings**2, 1)
-        return float(np.sum(odometry**2) / 2 + (STUDENT + 2) / 2 * np.sum(np.log1p(squares / STUDENT)))
+    def costs(self, place: Place) -> Array:
+        """Cost of each odometry step and of each sighting, (K - 1 + N,)."""
+        return self._costs(*self.residuals(*place))
+
+    def _costs(self, o: Array, s: Array) -> Array:
+        squares = np.sum(s**2, 1)
+        return np.concatenate([np.sum(o**2, 1) / 2, (STUDENT + 2) / 2 * np.log1p(squares / STUDENT)])
+
+    def linearise(self, place: Place, before: _Here | None = None) -> _Here:
+        """Weighted normal equations."""
+        o, s = self.residuals(*place)
+        root = _root_weights(s)
+        J = self.jacobian(*place, root)
+        r = np.concatenate([o.ravel(), (s * root[:, None]).ravel()])
+        N, g = (J.T @ J).tocsc(), J.T @ r
+        diagonal = N.diagonal()
+        cosine = np.abs(g) / np.sqrt(np.maximum(diagonal, 1e-300) * max(float(r @ r), 1e-300))
+        return _Here(place, self._costs(o, s), N, g, diagonal, float(cosine.max(initial=0.0)))
+
+    def step(self, here: _Here, damping: float) -> Step | None:
+        """Damped step, (N + damping diag N) step = -g."""
+        damped = here.N + sparse.diags(damping * here.diagonal + 1e-12, format="csc")
+        try:
+            change = splu(damped).solve(-here.g)
+        except RuntimeError:  # exactly singular
+            return None
+        square = float(here.diagonal @ change**2)
+        return Step(change, np.sqrt(square), 0.5 * float(damping * square - here.g @ change))
+
+    def move(self, here: _Here, step: Step) -> Place:
+        """Poses, landmarks and free calibration values after a step; the first pose is held."""
+        poses, landmarks, calibration = here.place
+        split = 3 * (len(poses) - 1)
+        end = split + landmarks.size
+        poses = poses.copy()
+        poses[1:] += step.change[:split].reshape(-1, 3)
+        changes = zip(self.free, step.change[end:], strict=True)
+        values = {name: getattr(calibration, name) + float(d) for name, d in changes}
+        return poses, landmarks + step.change[split:end].reshape(-1, 2), replace(calibration, **values)
 
     def jacobian(
         self, poses: Array, landmarks: Array, calibration: Calibration, root: Array
@@ -223,61 +265,35 @@ def solve_batch(
     whole = np.column_stack([start.poses[:, :2], np.unwrap(start.poses[:, 2])])
     times = sighting_times(log, calibration)
     poses = np.stack([np.interp(times, start.times, column) for column in whole.T], -1)
-    return _minimise(problem, (poses, landmarks, calibration), max_iterations)
+    start_here = problem.linearise((poses, landmarks, calibration))
+    options = Options(0.0, 0.0, TOLERANCE, max_iterations, Ceres(1e6))  # a filter's run is near
+    end = descend(problem, start_here, options, polish=False)  # a landmark may hang on a single sighting
+    return _result(problem, end)
 
 
-def _minimise(problem: _Problem, at: tuple[Array, Array, Calibration], max_iterations: int) -> Batch:
-    """Levenberg-Marquardt with the diagonal of the normal matrix as damping."""
-    o, s = problem.residuals(*at)
-    cost, damping, converged, iterations = problem.cost(o, s), 1e-4, False, 0
-    while iterations < max_iterations and not converged:
-        iterations += 1
-        root = _root_weights(s)
-        J = problem.jacobian(*at, root)
-        r = np.concatenate([o.ravel(), (s * root[:, None]).ravel()])
-        N, g = (J.T @ J).tocsc(), J.T @ r
-        new = np.inf
-        while new > cost and damping < 1e8:
-            step = splu(N + sparse.diags(damping * N.diagonal() + 1e-12, format="csc")).solve(-g)
-            trial = _moved(*at, step, problem.free)
-            o_new, s_new = problem.residuals(*trial)
-            new = problem.cost(o_new, s_new)
-            damping *= 10.0
-        if new > cost:
-            break  # no step helps: converged stays False
-        converged = cost - new <= TOLERANCE * cost
-        at, o, s, cost = trial, o_new, s_new, new
-        damping = max(damping / 100.0, 1e-12)
-    return _result(problem, at, cost, iterations, converged)
+class _Here(NamedTuple):
+    """The problem at a place: costs, rows of the Jacobian, normal equations N and g, their diagonal."""
+
+    place: Place
+    costs: Array
+    N: sparse.csc_matrix
+    g: Array
+    diagonal: Array
+    gradient_norm: float
+    stiffness: float = 1.0
 
 
-def _moved(
-    poses: Array, landmarks: Array, calibration: Calibration, step: Array, free: Sequence[str]
-) -> tuple[Array, Array, Calibration]:
-    split = 3 * (len(poses) - 1)
-    poses = poses.copy()
-    poses[1:] += step[:split].reshape(-1, 3)
-    end = split + landmarks.size
-    values = {name: getattr(calibration, name) + float(d) for name, d in zip(free, step[end:], strict=True)}
-    return poses, landmarks + step[split:end].reshape(-1, 2), replace(calibration, **values)
-
-
-def _result(
-    problem: _Problem, at: tuple[Array, Array, Calibration], cost: float, iterations: int, converged: bool
-) -> Batch:
-    poses, landmarks, calibration = at
-    _, s = problem.residuals(*at)
+def _result(problem: _Problem, end: Descent[_Here]) -> Batch:
+    poses, landmarks, calibration = end.here.place
+    _, s = problem.residuals(*end.here.place)
     relative, _ = problem.odometry(calibration)
     e = se2.between(poses[:-1], poses[1:]) - relative.mean
     e[:, 2] = so2.wrap(e[:, 2])
     scale = np.array([calibration.sigma_range, calibration.sigma_bearing])
     used = np.sum(s**2, 1) <= PLAUSIBLE
-    J = problem.jacobian(poses, landmarks, calibration, _root_weights(s))
-    N = (J.T @ J + 1e-12 * sparse.eye(J.shape[1])).tocsc()
-    f = len(problem.free)
-    unit = np.zeros((J.shape[1], f))
-    unit[J.shape[1] - f :] = np.eye(f)
-    free_cov = splu(N).solve(unit)[J.shape[1] - f :] if f else np.zeros((0, 0))
+    size, f = len(end.here.g), len(problem.free)
+    N = (end.here.N + 1e-12 * sparse.eye(size)).tocsc()
+    free_cov = splu(N).solve(np.eye(size)[:, size - f :])[size - f :] if f else np.zeros((0, 0))
     poses = np.column_stack([poses[:, :2], so2.wrap(poses[:, 2])])
     return Batch(
         times=sighting_times(problem.log, calibration),
@@ -285,12 +301,12 @@ def _result(
         ids=problem.ids,
         landmarks=landmarks,
         calibration=calibration,
-        cost=cost,
+        cost=float(end.here.costs.sum()),
         odometry=e,
         sightings=s * scale,
         used=used,
-        iterations=iterations,
-        converged=converged,
+        iterations=len(end.history),
+        converged=end.reason in CONVERGED,
         free=problem.free,
         free_cov=free_cov,
     )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.estimation.resection import refine_pose, resect
+from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.geometry.alignment import align
 from vslam_ref.geometry.camera_pose import camera_from_world, pose_from_centre
 from vslam_ref.geometry.cameras import Pinhole
@@ -19,7 +20,7 @@ from vslam_ref.geometry.multiview.epipolar import (
 )
 from vslam_ref.geometry.multiview.point_state import PointState
 from vslam_ref.geometry.multiview.three_points import p3p
-from vslam_ref.geometry.multiview.triangulation import triangulate, triangulate_linear
+from vslam_ref.geometry.multiview.triangulation import triangulate_linear
 from vslam_ref.geometry.multiview.views import Views
 
 Array = NDArray[Any]

@@ -31,11 +31,11 @@ class Listed:
     at: int = field(default=0)
     downhill_only: bool = True
 
-    def scale(self, jacobian: Array, before: Array | None) -> Array:
+    def scale(self, lengths: Array, before: Array | None) -> Array:
         """Ones."""
-        return np.ones(jacobian.shape[1])
+        return np.ones(len(lengths))
 
-    def first(self, jacobian: Array, scale: Array) -> DampingState:
+    def first(self, stiffness: float) -> DampingState:
         """The first of the list."""
         return DampingState(self.values[0], 1.0)
 
