@@ -147,8 +147,8 @@ def cites(item: Item) -> bool:
     """Whether it says which equation it computes."""
     if equation_index.CITATION.search(item.own):
         return True
-    lines = ast.get_source_segment(item.source, item.node) or ""
-    return bool(equation_index.REMARK.search(lines))
+    lines = item.source.splitlines()[item.node.lineno - 1 : item.node.end_lineno]
+    return any(equation_index.REMARK.search(line) for line in lines)
 
 
 def misses_of(item: Item) -> list[tuple[str, str]]:
