@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 PROGRESS = re.compile(r"^(?P<what>[a-z][\w ]+)\.\.\. \[ *(?P<share>\d+)%\]")
+SETTINGS = re.compile(r"myst(-nb)? v")  # all of them, on two lines of a thousand characters
 ESCAPE = re.compile(r"\x1b\[[\d;]*[A-Za-z]")
 
 
@@ -30,7 +31,7 @@ def condensed(lines: Iterable[str]) -> Iterator[str]:
         line = ESCAPE.sub("", line.rstrip())
         match = PROGRESS.match(line)
         if match is None:
-            if line:
+            if line and not SETTINGS.match(line):
                 yield line
             continue
         now = match["what"], int(match["share"]) // 10
