@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROBE = """
 import json, sys, warnings
 import numpy as np
+from vslam_ref import _kernels
 from vslam_ref.filters.ekf_slam import EkfSlam
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.support.errors import InputError
@@ -39,8 +40,8 @@ with warnings.catch_warnings(record=True) as said:
     except InputError as refused:
         error = str(refused)
 said = [str(warning.message) for warning in said]
-x = slam.pose().mean[0].round(9).tolist()
-print(json.dumps({"x": x, "said": said, "error": error, "numba": "numba" in sys.modules}))
+found = {"said": said, "error": error, "numba": "numba" in sys.modules, "aside": _kernels.set_aside()}
+print(json.dumps(found | {"x": slam.pose().mean[0].round(9).tolist()}))
 """
 STEPS = [0.0, 0.5, 1.0]  # the headings in which the three metres are driven
 DRIVEN = np.array([np.cos(STEPS).sum(), np.sin(STEPS).sum(), 1.5])
@@ -108,6 +109,8 @@ def test_a_changed_sign_is_seen(tmp_path: Path) -> None:
     assert len(found["said"]) == 1
     assert name in found["said"][0]
     assert "make twins" in found["said"][0]
+    assert "slam:ekf_predict" in found["aside"]  # what a result's provenance says
+    assert "grids:apply_plain" not in found["aside"]
     assert not found["numba"]
     refused = probe(folder, "numba")
     assert name in refused["error"]
@@ -127,6 +130,7 @@ def test_remarks_and_line_ends_change_nothing(tmp_path: Path) -> None:
     assert np.abs(found["x"] - DRIVEN).max() < 1e-8
     assert found["said"] == []
     assert found["error"] is None
+    assert found["aside"] == []
     assert found["numba"]
 
 
@@ -148,9 +152,9 @@ def test_a_warm_cache_does_not_hide_a_change_of_a_part(tmp_path: Path) -> None:
     """Numba alone would go on with the old machine code: the kernel's own file is as it was."""
     folder = copy_of(tmp_path)
     tests = "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/kernels/test_twins.py"
-    one = "-k", "test_twin_does_what_numpy_does and ekf_update and 1-1"
+    one = "-k", "test_twin_does_what_numpy_does and reduced_apply and 1-1"
     assert run(folder, *tests, *one).returncode == 0
-    edit(folder / "vslam_ref" / "_kernels" / "_blocks.py", "x_p[q] += y * u", "x_p[q] -= y * u")
+    edit(folder / "vslam_ref" / "_kernels" / "_blocks.py", "== P_mm.itemsize", "== -P_mm.itemsize")
     done = run(folder, *tests, *one)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "1 failed" in done.stdout

@@ -117,6 +117,13 @@ def _is_current(twin: str) -> bool:
     return False
 
 
+def set_aside() -> list[str]:
+    """Return the twins that are not used, since the code of their pair has changed."""
+    from vslam_ref._kernels import _digests
+
+    return sorted(twin for twin in _digests.stored()["pairs"] if _digests.changed_files(twin))
+
+
 @functools.cache
 def _load(twin: str) -> Callable[..., Any]:
     module, _, name = twin.partition(":")
