@@ -6,6 +6,7 @@ WORKERS ?= 2
 PYTEST_ARGS ?=
 FUZZ_ARGS ?=
 MUTANTS_ARGS ?=
+REPRODUCE_ARGS ?=
 
 BIN    := $(VENV)/bin
 PY     := $(BIN)/python
@@ -17,11 +18,14 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench grade clean
+.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
 	@echo "make test        run the tests (make test-slow: the long ones)"
+	@echo "make test-random test properties with fresh random examples"
+	@echo "make test-portable   test the numeric rooms as two older processors compute"
+	@echo "make twins       test the Numba twins and turn them on after a change of either form"
 	@echo "make fuzz        damage 10,000 files of every reader and see what it says"
 	@echo "make vectors     make the conformance vectors anew (make vectors-check: compare)"
 	@echo "make mutants     count the mistakes in formulas that the vectors notice"
@@ -49,13 +53,23 @@ venv: $(call DONE,fast)
 # --- what people run ------------------------------------------------------------------------
 
 reproduce: $(call DONE,fast)
-	$(BIN)/vslam-ref reproduce $(FIGURES) --out $(OUT)
+	$(BIN)/vslam-ref reproduce $(FIGURES) --out $(OUT) $(REPRODUCE_ARGS)
 
 test: $(call DONE,fast) $(call DONE,test)
 	$(PYTEST) $(PYTEST_ARGS)
 
 test-slow: $(call DONE,fast) $(call DONE,test)
 	$(PYTEST) -m slow $(PYTEST_ARGS)
+
+test-random: $(call DONE,fast) $(call DONE,test)
+	$(PYTEST) -m "hypothesis and not slow" --hypothesis-profile=fresh $(PYTEST_ARGS)
+
+PROCESSORS ?= prescott haswell
+test-portable: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/portable.py $(PROCESSORS) -- -n $(WORKERS) $(PYTEST_ARGS)
+
+twins: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/kernels/bless.py
 
 fuzz: $(call DONE,fast) $(call DONE,test)
 	$(ONE_THREAD) $(PY) tests/datasets/fuzz_readers.py $(FUZZ_ARGS)
@@ -85,6 +99,7 @@ lint: $(call DONE,fast) $(call DONE,test)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	$(PY) docs/_tools/docstrings.py --check
 
 format: $(call DONE,test)
 	$(BIN)/ruff check --fix .
@@ -105,9 +120,7 @@ docs: $(call DONE,fast) $(call DONE,docs)
 	$(PY) docs/_tools/equation_index.py --check
 	$(PY) docs/_tools/mathjax.py $(BUILD)/mathjax
 	$(PY) docs/_tools/stage.py $(BUILD)/source
-	rm -rf $(BUILD)/html
-	$(PY) -m sphinx -W --keep-going -q -E -b html -d $(BUILD)/doctrees $(BUILD)/source $(BUILD)/html
-	@echo "the book: $(BUILD)/html/index.html"
+	$(PY) docs/_tools/make_site.py $(BUILD)
 
 clean:
 	rm -rf $(VENV) $(OUT) $(BUILD) dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

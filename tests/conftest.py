@@ -5,6 +5,9 @@
 
 Such a test module says ``EXERCISE = "16_name"`` and takes the fixture ``answer``: the module loaded from
 ``docs/chapters/solutions/16_name.py`` or from the student's file.
+
+Property tests draw the same examples in every run.  ``make test-random`` draws fresh ones
+(``--hypothesis-profile=fresh``); what it finds is mended, and pinned with ``@example``.
 """
 
 from __future__ import annotations
@@ -13,7 +16,12 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
+import hypothesis
 import pytest
+
+hypothesis.settings.register_profile("repeatable", deadline=None, database=None, derandomize=True)
+hypothesis.settings.register_profile("fresh", deadline=None, database=None, max_examples=1000)
+hypothesis.settings.load_profile("repeatable")
 
 SOLUTIONS = Path(__file__).resolve().parents[1] / "docs" / "chapters" / "solutions"
 

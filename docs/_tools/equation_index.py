@@ -3,18 +3,23 @@
     python docs/_tools/equation_index.py --write      # store the index
     python docs/_tools/equation_index.py --check      # exit status 1 when the stored index is out of date
     python docs/_tools/equation_index.py --labels     # cited labels that no page defines
+    python docs/_tools/equation_index.py --uncited    # labels of chapters that no code cites; status 1 if any
 
 A citation counts only in a sentence that begins with the word "Implements", in the docstring of the
 function, class or module that computes the equation: ``Implements :eq:`eq-b16` (B16).`` Names without a
 link count there too (``B23``, ``B1-B3``), and what has no equation number is cited in words: ``A§2.2.1``,
-``B fig 2``.
+``B fig 2``.  For ``--uncited``, a comment at the line that computes an equation counts as well, if it begins
+with the label: ``# eq-gain``, ``# eq-gain, eq-b16: why``.  A label ``eq-step-...`` is a step of a derivation
+and needs no citation.
 """
 
 from __future__ import annotations
 
 import ast
+import io
 import re
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,6 +32,8 @@ SEED_LABEL = re.compile(r"eq-([ab])(\d+(?:-\d+)?)$")
 CITATION = re.compile(r"\bImplements\b(.*?)(?:\.(?=\s|$)|\n\s*\n|$)", re.DOTALL)
 SPAN = re.compile(r"\b([AB])(\d+)\s?[-–]\s?\1?(\d+)\b")
 PLAIN = re.compile(r"\b[AB](?:\d+(?:\.\d+)?\b|§\d+(?:\.\d+)*| (?:fig|table) \d+(?:\.\d+)?)")
+REMARK = re.compile(r"#\s*(eq-[\w-]+(?:,\s*eq-[\w-]+)*)(?![\w-])")
+STEP = "eq-step-"
 DEFINED = re.compile(r"\$\$[ \t]*\(([\w-]+)\)\s*$|:label:[ \t]*([\w-]+)", re.MULTILINE)
 
 HEAD = """\
@@ -105,11 +112,49 @@ def index_text() -> str:
     return HEAD + "\n".join(lines) + "\n"
 
 
+def labels_at_lines(source: str) -> set[str]:
+    """Labels in the comments of a file, each comment beginning with its labels."""
+    found: set[str] = set()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and (match := REMARK.match(token.string)):
+            found |= {label.strip() for label in match[1].split(",")}
+    return found
+
+
+def computed_labels() -> tuple[set[str], set[str]]:
+    """Labels that the library says it computes, and the seeds' items that it names without a label."""
+    labels: set[str] = set()
+    for path in sorted(book.PACKAGE.rglob("*.py")):
+        labels |= labels_at_lines(path.read_text(encoding="utf-8"))
+        for _, docstring in docstrings(path):
+            for sentence in CITATION.findall(docstring):
+                labels |= set(LABEL.findall(sentence))
+    return labels, set(citations())
+
+
+def defined_labels(page: Path) -> list[str]:
+    """Labels that a page defines, in its order."""
+    return [next(filter(None, groups)) for groups in DEFINED.findall(page.read_text(encoding="utf-8"))]
+
+
+def uncited_labels() -> dict[str, list[str]]:
+    """Chapter -> labels that no library code cites, steps of derivations left out."""
+    labels, items = computed_labels()
+    found = {}
+    for page in book.pages():
+        missing = [
+            label
+            for label in defined_labels(page)
+            if label not in labels and item_of_label(label) not in items and not label.startswith(STEP)
+        ]
+        if missing:
+            found[page.stem[:2]] = missing
+    return found
+
+
 def undefined_labels() -> list[str]:
     """Labels that docstrings cite and no page defines."""
-    texts = [path.read_text(encoding="utf-8") for path in book.DOCS.glob("*.md")]
-    texts += [page.read_text(encoding="utf-8") for page in book.pages()]
-    defined = {next(filter(None, groups)) for text in texts for groups in DEFINED.findall(text)}
+    defined = {label for page in [*book.DOCS.glob("*.md"), *book.pages()] for label in defined_labels(page)}
     cited = {
         label
         for path in book.PACKAGE.rglob("*.py")
@@ -124,6 +169,10 @@ def main(arguments: list[str]) -> int:
     if arguments == ["--labels"]:
         print("\n".join(undefined_labels()))
         return 0
+    if arguments == ["--uncited"]:
+        uncited = uncited_labels()
+        print("\n".join(f"{number}  {label}" for number, labels in uncited.items() for label in labels))
+        return 1 if uncited else 0
     problems = unknown_items(citations())
     if arguments == ["--write"]:
         INDEX.write_text(index_text(), encoding="utf-8")

@@ -24,6 +24,11 @@ EQUAL, BROKEN = 2e-11, 2e-8
 KINDS = ("first_order", "gaussian")
 
 
+def off_by(found: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference, for numbers above 10 relative to them: ``EQUAL`` is derived for 10."""
+    return float(np.abs(found - expected).max() / max(1.0, np.abs(expected).max() / 10.0))
+
+
 def compare_with_literal(slam: Any, drive: Any, literals: list[Any]) -> float:
     """Feed both; the largest difference of pose states, innovations, S, and all r_i at the end."""
     worst = 0.0
@@ -38,22 +43,19 @@ def compare_with_literal(slam: Any, drive: Any, literals: list[Any]) -> float:
             other = one.update(step.ids.tolist(), step.z[b], drive.cov_z)
             if seen is not None and other is not None:
                 # known landmarks keep the order of the sighting in every form
-                worst = max(
-                    worst, np.abs(seen.innovation[b] - other[0]).max(), np.abs(seen.S[b] - other[1]).max()
-                )
+                worst = max(worst, off_by(seen.innovation[b], other[0]), off_by(seen.S[b], other[1]))
     ids, zero = drive.every_landmark()
     last = slam.update(ids, zero, drive.cov_z)
     for b, one in enumerate(literals):
         expected = one.update(ids.tolist(), zero[b], drive.cov_z)
-        worst = max(
-            worst, np.abs(last.innovation[b] - expected[0]).max(), np.abs(last.S[b] - expected[1]).max()
-        )
+        worst = max(worst, off_by(last.innovation[b], expected[0]), off_by(last.S[b], expected[1]))
         pose, x = slam.pose(), one.x
         J = np.zeros((3, len(x)))
         J[0, 0] = J[1, 1] = 1.0
         J[2, 2:4] = np.array([x[3], -x[2]]) / (x[2] ** 2 + x[3] ** 2)
-        worst = max(worst, np.abs(pose.mean[b] - [x[0], x[1], np.arctan2(x[2], x[3])]).max())
-        worst = max(worst, np.abs(pose.cov[b] - J @ one.P @ J.T).max())
+        worst = max(worst, off_by(pose.mean[b], np.array([x[0], x[1], np.arctan2(x[2], x[3])])))
+        # the heading's row of J grows as its vector (s, c) gets shorter than 1, and the errors with it
+        worst = max(worst, off_by(pose.cov[b], J @ one.P @ J.T) / max(1.0, np.linalg.norm(J[2]) ** 2))
     return float(worst)
 
 

@@ -213,7 +213,9 @@ def test_every_reason_can_be_had() -> None:
     # steps win 1e-2, 2e-4, 5e-6 and 1e-7 of the cost, the gradient falls by 6 each time: no rounding decides
     coarse = Options(gradient=0.0, step=0.0, cost=1e-6)
     cases = {
-        "gradient": minimise(lambda x: np.stack([x[0] - 1.0, 2 * x[0], x[0] ** 2]), [1.0]),
+        "gradient": minimise(
+            lambda x: np.stack([x[0] - 1.0, 2 * x[0], x[0] ** 2]), [1.0], options=Options(gradient=1e-4)
+        ),
         "step": minimise(exponential, [30.0], options=Options(step=0.5)),
         "cost": minimise(lambda x: np.stack([x[0] ** 2 - 1.0, x[0] + 3.0]), [1.0], options=coarse),
         "max_iterations": minimise(rosenbrock, [-1.2, 1.0], options=Options(max_iterations=3)),
@@ -231,6 +233,15 @@ def test_every_reason_can_be_had() -> None:
         assert not math.isnan(found.cost)
     assert [n for n, found in cases.items() if found.converged] == ["gradient", "step", "cost"]
     assert cases["max_iterations"].iterations == 3
+
+
+def test_without_thresholds_it_ends_where_rounding_does() -> None:
+    """Which of the two reasons is had there is chosen by the last bit of the processor's sums."""
+    found = minimise(
+        lambda x: np.stack([x[0] ** 2 - 1.0, x[0] + 3.0]), [1.0], options=Options(gradient=0.0, step=0.0)
+    )
+    assert found.reason in ("cost", "gradient")
+    assert found.history[-1].gradient_norm < 1e-14  # eps times the ten operations of two rows, and margin
 
 
 def test_a_rank_deficient_problem_is_solved_damped_and_has_no_covariance() -> None:

@@ -8,6 +8,10 @@ A NumPy function that has a twin says so with :func:`accelerated`::
 The name before the colon is a module of this package, the one behind it a function there with the
 same signature.  ``VSLAM_REF_BACKEND`` chooses: ``auto`` (Numba when installed, the default),
 ``numpy`` or ``numba``.  Numba is imported at the first accelerated call, never at import.
+
+A twin stands for the NumPy function that it was tested against.  If the code of one of the two has changed
+since (``digests.json``, which ``make twins`` writes), NumPy runs, and one warning says so; where
+``VSLAM_REF_BACKEND=numba`` demands the twin, that is an error.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import functools
 import importlib
 import importlib.util
 import os
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
@@ -28,6 +33,8 @@ REGISTRY: dict[str, tuple[Callable[..., Any], str]] = {}
 """Dotted name of the NumPy function -> (the NumPy function itself, ``module:function`` of its twin)."""
 
 _chosen: str | None = None
+_demanded = False  # Numba by name, not by "auto"
+_warned = False
 
 
 def backend() -> str:
@@ -39,9 +46,10 @@ def backend() -> str:
         If ``VSLAM_REF_BACKEND`` is none of ``auto``, ``numpy``, ``numba``, or asks for Numba where
         it is not installed.
     """
-    global _chosen
+    global _chosen, _demanded
     if _chosen is None:
-        _chosen = _resolve(os.environ.get("VSLAM_REF_BACKEND", "auto"))
+        wanted = os.environ.get("VSLAM_REF_BACKEND", "auto")
+        _chosen, _demanded = _resolve(wanted), wanted == "numba"
     return _chosen
 
 
@@ -59,13 +67,13 @@ def _resolve(wanted: str) -> str:
 @contextmanager
 def use_backend(name: str) -> Iterator[str]:
     """Run a block with backend ``name`` (``auto``, ``numpy`` or ``numba``), then restore the old one."""
-    global _chosen
-    before = _chosen
-    _chosen = _resolve(name)
+    global _chosen, _demanded
+    before = _chosen, _demanded
+    _chosen, _demanded = _resolve(name), name == "numba"
     try:
         yield _chosen
     finally:
-        _chosen = before
+        _chosen, _demanded = before
 
 
 def accelerated(twin: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -79,14 +87,41 @@ def accelerated(twin: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         def choose(*args: P.args, **kwargs: P.kwargs) -> R:
             nonlocal kernel
             if _chosen == "numba" or (_chosen is None and backend() == "numba"):
-                if kernel is None:
-                    kernel = _load(twin)
+                if kernel is None or (_demanded and kernel is function):
+                    kernel = _load(twin) if _is_current(twin) else function
                 return kernel(*args, **kwargs)  # type: ignore[no-any-return]
             return function(*args, **kwargs)
 
         return choose
 
     return declare
+
+
+def _is_current(twin: str) -> bool:
+    """Whether a twin may stand for its function; if not, warn once, or raise where Numba is demanded."""
+    global _warned
+    from vslam_ref._kernels import _digests
+
+    changed = ", ".join(_digests.changed_files(twin))
+    if not changed:
+        return True
+    said = f"{changed}: changed since NumPy and Numba were tested to give the same here"
+    if _demanded:
+        from vslam_ref.support.errors import InputError
+
+        raise InputError(f"VSLAM_REF_BACKEND=numba, but {said}: 'make twins' tests them again")
+    if not _warned:
+        _warned = True
+        said += "; NumPy runs instead of Numba until 'make twins' has tested them again"
+        warnings.warn(said, RuntimeWarning, stacklevel=3)
+    return False
+
+
+def set_aside() -> list[str]:
+    """Return the twins that are not used, since the code of their pair has changed."""
+    from vslam_ref._kernels import _digests
+
+    return sorted(twin for twin in _digests.stored()["pairs"] if _digests.changed_files(twin))
 
 
 @functools.cache
@@ -99,5 +134,5 @@ def _load(twin: str) -> Callable[..., Any]:
 def warm(*modules: str) -> None:
     """Compile every twin, or those of some modules, or read them from the cache on disk, now."""
     for _, twin in REGISTRY.values():
-        if not modules or twin.partition(":")[0] in modules:
+        if (not modules or twin.partition(":")[0] in modules) and _is_current(twin):
             _load(twin)

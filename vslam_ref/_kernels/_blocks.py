@@ -10,9 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic
+
+from vslam_ref._kernels._signature import njit
 
 TILE = 256
 """Columns at a time, so that their part of W stays in the fastest cache."""

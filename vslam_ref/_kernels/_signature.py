@@ -2,13 +2,64 @@
 
 One signature means no second compilation when a map is full or a run alone.  A kernel is compiled, or read
 from the cache, at its own first call and not with its module: a program waits for what it uses only.
+
+Numba takes a kernel from its cache as long as the kernel's own file is the same, whatever has changed in the
+functions that it calls.  So the folder of the cache is named after the digest of all files of this package.
 """
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import os
+import tempfile
+from pathlib import Path
 from typing import Any
 
-from numba import njit, types
+import numba
+from numba import types
+
+HERE = Path(__file__).resolve().parent
+CONFIG: Any = numba.config
+
+
+@functools.cache
+def cache_folder() -> str | None:
+    """Return the folder of the compiled kernels, or None where each process must compile them itself.
+
+    It lies in ``NUMBA_CACHE_DIR`` if that is set, else beside the kernels, else in ``~/.cache/vslam_ref``:
+    the first that can be written to.
+    """
+    sources = [path.read_bytes() for path in sorted(HERE.glob("*.py"))]
+    if not sources:
+        return None  # zipped, or compiled files only: Numba cannot tell when its code is out of date
+    name = "kernels-" + hashlib.sha256(b"".join(sources)).hexdigest()[:16]
+    bases = CONFIG.CACHE_DIR, HERE / "__pycache__", os.path.expanduser("~/.cache/vslam_ref")
+    for base in filter(None, bases):
+        folder = os.path.join(base, name)
+        try:
+            os.makedirs(folder, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        return folder
+    return None
+
+
+def njit(*, cache):
+    """Compile at the first call, as ``numba.njit`` does, and keep the code in :func:`cache_folder`."""
+
+    def declare(function):
+        folder, before = cache_folder(), CONFIG.CACHE_DIR
+        if folder is None:
+            return numba.njit(function)
+        try:
+            CONFIG.CACHE_DIR = folder  # read when the function is declared
+            return numba.njit(cache=cache)(function)
+        finally:
+            CONFIG.CACHE_DIR = before
+
+    return declare
 
 
 def given(ndim, dtype=types.float64):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from vslam_ref._kernels._signature import given, kernel
+from vslam_ref._kernels._signature import given, kernel, njit
 
 _int = types.int64
 _array = lambda n: types.Array(types.float64, n, "C")  # noqa: E731

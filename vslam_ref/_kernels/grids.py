@@ -7,9 +7,9 @@ above the next row kept as an integer: no rounding, no division.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from vslam_ref._kernels._signature import given, kernel
+from vslam_ref._kernels._signature import given, kernel, njit
 
 QUANTA = 4096
 MAX_LENGTH = 16384

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from vslam_ref._kernels._blocks import (
     TILE,
@@ -14,7 +14,7 @@ from vslam_ref._kernels._blocks import (
     shrink_map,
     whiten,
 )
-from vslam_ref._kernels._signature import changed, given, kernel, made
+from vslam_ref._kernels._signature import changed, given, kernel, made, njit
 
 
 @njit(cache=True)

@@ -21,6 +21,8 @@ PACKAGE = Path(vslam_ref.__file__).parent
 def versions() -> dict[str, Any]:
     """Return the versions of everything that can change a number; None for what is absent."""
     commit, dirty = git_state()
+    backend = _kernels.backend()
+    aside = _kernels.set_aside() if backend == "numba" else []
     return {
         "vslam_ref": vslam_ref.__version__,
         "git_commit": commit,
@@ -31,7 +33,8 @@ def versions() -> dict[str, Any]:
         "numba": _version("numba"),
         "matplotlib": _version("matplotlib"),
         "platform": platform.platform(),
-        "backend": _kernels.backend(),
+        "backend": backend,
+        **({"twins_set_aside": aside} if aside else {}),  # NumPy ran in their place
     }
 
 
