@@ -29,6 +29,12 @@ in_one_piece: Any = intrinsic(_as_contiguous)
 """Look at a row as at a contiguous array, which :func:`check_rows` found it to be."""
 
 
+def room_for_innovation(z):
+    """Empty arrays (B, 2 m), (B, 2 m, 2 m) for the innovation of measurements z (B, m, 2) and its S."""
+    B, m, _ = z.shape
+    return np.empty((B, 2 * m)), np.empty((B, 2 * m, 2 * m))
+
+
 @njit(cache=True)
 def check_rows(x_m, P_pm, P_mm):
     """Raise unless the last axis is contiguous, as it is in any view of whole rows or their beginnings."""

@@ -12,10 +12,11 @@ from vslam_ref._kernels._blocks import (
     in_one_piece,
     load_landmarks,
     load_tile,
+    room_for_innovation,
     shrink_rows,
     whiten,
 )
-from vslam_ref._kernels._signature import changed, given, kernel
+from vslam_ref._kernels._signature import changed, given, kernel, unpacks
 
 
 @njit(cache=True)
@@ -78,8 +79,11 @@ def _put(G, row, column, value):
 
 
 @kernel(changed(2), changed(3), changed(2, types.complex128), given(3), given(4))
-def reduced_predict(x_p, P_a, frame, control, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict`, control by control."""
+def reduced_predict_in_place(x_p, P_a, frame, control, cov):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_in_place`.
+
+    Control by control.
+    """
     G, N = np.zeros((8, 5)), np.zeros((8, 8))  # rows: x, y, sin, cos, Re A, Im A, Re g, Im g
     for b in range(x_p.shape[0]):
         h, D, e = complex(x_p[b, 3], x_p[b, 2]), complex(0.0, 0.0), complex(1.0, 0.0)
@@ -105,8 +109,8 @@ def reduced_predict(x_p, P_a, frame, control, cov):
 
 
 @kernel(changed(2), changed(3), changed(2, types.complex128), given(2), given(2), given(4))
-def reduced_predict_first_order(x_p, P_a, frame, ds, dalpha, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_first_order`.
+def reduced_predict_first_order_in_place(x_p, P_a, frame, ds, dalpha, cov):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_first_order_in_place`.
 
     Written out for noise in (ds, dalpha): with dm = -i m dalpha, A is -i dalpha and g is
     -dds / c_old + i tau_new dalpha / c_new.
@@ -225,8 +229,7 @@ _MAP = (given(2), changed(3), changed(3), types.int64, changed(3), changed(2, ty
 
 
 @kernel(*_MAP)
-def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_apply`."""
+def _apply_all(x_m, P_pm, P_mm, b, P_a, frame):
     check_rows(x_m, P_pm, P_mm)
     M = x_m.shape[1]
     E, NE = np.zeros((4, M)), np.empty((4, M))
@@ -237,6 +240,12 @@ def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
             even, odd = in_one_piece(P_mm[run, r]), in_one_piece(P_mm[run, r + 1])
             _add_noise(E[0, r], E[0, r + 1], NE, even, odd)
         _forget(P_a[run], frame[run])
+
+
+@unpacks(_apply_all)
+def reduced_apply_in_place(state, b, P_a, frame):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_apply_in_place`."""
+    _apply_all(state.x_m, state.P_pm, state.P_mm, b, P_a, frame)
 
 
 @njit(cache=True)
@@ -258,8 +267,7 @@ def _turn_pairs(c, columns, W, S):
     *(changed(2), changed(2), *_MAP[1:]),
     *(given(1, types.int64), given(3), given(3), changed(2), changed(3)),
 )
-def reduced_update(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update`."""
+def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S):
     check_rows(x_m, P_pm, P_mm)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 5)), np.empty((k, min(M, TILE)))
@@ -285,3 +293,12 @@ def reduced_update(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innov
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])
         _change_map(W, tile, E, NE, noise, b, P)
         _forget(P_a[run], frame[run])
+
+
+@unpacks(_update_all)
+def reduced_update_in_place(state, b, P_a, frame, columns, z, cov_z):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update_in_place`."""
+    innovation, S = room_for_innovation(z)
+    x_p, x_m, _, P_pm, P_mm = state
+    _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S)
+    return innovation, S

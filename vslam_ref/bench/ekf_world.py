@@ -8,9 +8,8 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.filters import observation, vehicle
-from vslam_ref.filters.ekf_slam import EkfSlam
-from vslam_ref.filters.ekf_step import ekf_step
-from vslam_ref.filters.estimates import SlamFilter, room_for_innovation
+from vslam_ref.filters.ekf_slam import EkfSlam, ekf_predict_in_place, ekf_update_in_place
+from vslam_ref.filters.estimates import SlamFilter
 
 SEEN = 5
 """Landmarks seen in a step."""
@@ -60,13 +59,13 @@ def class_step(world: World) -> Callable[[], object]:
 
 
 def array_step(world: World) -> Callable[[], object]:
-    """The same step by :func:`ekf_step` on plain arrays."""
+    """The same step by the functions on plain arrays, without the class."""
     b = world.start_ekf().blocks
     columns, z, cov_z = b.columns(world.seen), world.z[None, world.seen], np.tile(world.cov_z, (SEEN, 1, 1))
-    state, increment = (b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm), world.increment()
-    arrays = (*state, *increment, columns, z, cov_z, *room_for_innovation(z))
+    state, increment = b.state, world.increment()
 
     def step() -> None:
-        ekf_step(*arrays)
+        ekf_predict_in_place(state, increment)
+        ekf_update_in_place(state, columns, z, cov_z)
 
     return step

@@ -10,9 +10,10 @@ EKF-4 growth of a step from 50 to 200 landmarks, as an exponent
 IM-1  ``import vslam_ref`` against ``import numpy``; first accelerated call with a warm cache
 ===== =========================================================================================
 
-Our step is ``ekf_step`` on plain arrays; what the checks and book-keeping of :class:`EkfSlam` cost is shown
-beside it.  filterpy is used in three ways (``filterpy_peer``): that of its users is the goal's peer; the two
-others have models written for speed and are harder.
+Our step is that of ``filters.ekf_slam`` on plain arrays; what the checks and book-keeping of
+:class:`EkfSlam` cost is shown beside it.  filterpy is used in three ways
+(``filterpy_peer``): that of its users is the goal's peer; the two others have models written for speed and
+are harder.
 
 The reduced IEKF puts increments down and uses them together.  So its cycle is also measured with the pose
 read after every prediction, by both filters, where it cannot.

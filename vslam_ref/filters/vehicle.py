@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry import so2
 
 
@@ -125,41 +125,67 @@ class PropagateJacobians(NamedTuple):
     J_increment: Array
 
 
-def propagate(pose: ArrayLike, increment: ArrayLike) -> Array:
-    """Move a pose (x, y, theta) by (ds, dalpha): first along the old heading, then turn.
+def motion_model(T_world_vehicle: Array, ds: Array, dalpha: Array) -> PropagateJacobians:
+    """Move a pose by an increment, first along the old heading, then turn; with F and G.
+
+    Implements :eq:`eq-b4` (B4) and :eq:`eq-jacobians-motion`.  This is the package's one motion model:
+    worlds, :func:`propagate` and the filters all call it.  (Numba's twin of the EKF repeats it.)
+
+    Parameters
+    ----------
+    T_world_vehicle : ndarray, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
+    ds, dalpha : ndarray, shapes (...)
+        Distance along the heading, metres, and turn, radians.
+
+    Returns
+    -------
+    PropagateJacobians
+        The new pose, its angle in (-pi, pi]; ``J_pose`` is F, ``J_increment`` is G.
+    """
+    x, y, theta = T_world_vehicle[..., 0], T_world_vehicle[..., 1], T_world_vehicle[..., 2]
+    c, s = np.cos(theta), np.sin(theta)
+    ahead, left = ds * c, ds * s
+    shape = np.shape(x + ahead)
+    value, F, G = np.empty((*shape, 3)), np.zeros((*shape, 3, 3)), np.zeros((*shape, 3, 2))
+    value[..., 0] = x + ahead  # eq-b4
+    value[..., 1] = y + left
+    value[..., 2] = so2.wrap(theta + dalpha)
+    F[..., 0, 0] = F[..., 1, 1] = F[..., 2, 2] = 1.0  # eq-jacobians-motion
+    F[..., 0, 2], F[..., 1, 2] = -left, ahead
+    G[..., 0, 0], G[..., 1, 0], G[..., 2, 1] = c, s, 1.0
+    return PropagateJacobians(value, F, G)
+
+
+def propagate(T_world_vehicle: ArrayLike, increment: ArrayLike) -> Array:
+    """Move a pose by (ds, dalpha): first along the old heading, then turn.
 
     Implements :eq:`eq-b4` (B4) together with a drive.
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
-        World frame, metres and radians.
+    T_world_vehicle : array_like, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
     increment : array_like, shape (..., 2)
-        ds and dalpha.
+        ds (m) and dalpha (rad).
 
     Returns
     -------
     ndarray, shape (..., 3)
         The new pose, its angle in (-pi, pi].
+
+    Examples
+    --------
+    >>> propagate([1.0, 2.0, 0.0], [0.5, 0.25])
+    array([1.5 , 2.  , 0.25])
     """
-    return propagate_with_jacobians(pose, increment).value
+    return propagate_with_jacobians(T_world_vehicle, increment).value
 
 
-def propagate_with_jacobians(pose: ArrayLike, increment: ArrayLike) -> PropagateJacobians:
-    """:func:`propagate` and its Jacobians; same parameters."""
-    pose, inc = np.asarray(pose, dtype=np.float64), np.asarray(increment, dtype=np.float64)
-    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
-    ds, dalpha = inc[..., 0], inc[..., 1]
-    value = np.stack([pose[..., 0] + ds * c, pose[..., 1] + ds * s, so2.wrap(pose[..., 2] + dalpha)], -1)
-    J_pose = np.zeros((*value.shape[:-1], 3, 3))
-    J_pose[..., [0, 1, 2], [0, 1, 2]] = 1.0
-    J_pose[..., 0, 2] = -ds * s
-    J_pose[..., 1, 2] = ds * c
-    J_increment = np.zeros((*value.shape[:-1], 3, 2))
-    J_increment[..., 0, 0] = c
-    J_increment[..., 1, 0] = s
-    J_increment[..., 2, 1] = 1.0
-    return PropagateJacobians(value, J_pose, J_increment)
+def propagate_with_jacobians(T_world_vehicle: ArrayLike, increment: ArrayLike) -> PropagateJacobians:
+    """:func:`propagate` and its Jacobians F and G; same parameters."""
+    pose, inc = as_array("T_world_vehicle", T_world_vehicle, 3), as_array("increment", increment, 2)
+    return motion_model(pose, inc[..., 0], inc[..., 1])
 
 
 def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: float) -> Array:

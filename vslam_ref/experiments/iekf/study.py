@@ -27,7 +27,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
-from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.metrics.consistency import nees_pose, nis, pose_error
 from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
@@ -161,7 +161,9 @@ def make_filter(name: str, mean: Array, cov: Array, config: StudyConfig, world: 
         return carleman_ekf(mean, cov, config.iekf_form, n, config.iekf_start, config.iekf_control)
     if name == "ekf-anchored":
         return AnchoredEkf(mean, cov, n)
-    return EkfSlam(mean, cov, n, Truth(world.poses, world.landmarks) if name == "ekf-ideal" else None)
+    if name == "ekf-ideal":
+        return IdealEkf(mean, cov, Truth(world.poses, world.landmarks), n)
+    return EkfSlam(mean, cov, n)
 
 
 def simulate(task: Task) -> RunArrays:

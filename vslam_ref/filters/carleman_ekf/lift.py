@@ -127,6 +127,18 @@ def landmark_matrix(w: ArrayLike, variant: Variant = AS_CORRECTED) -> Array:
     return np.tensordot(np.asarray(w, dtype=np.float64), matrices, 1)
 
 
+def control_jacobian(z: Array, variant: Variant = AS_CORRECTED) -> Array:
+    """Jacobian (B, 11 + 6 n, 8) of the moved state in the control monomials (all but the constant one).
+
+    Implements :eq:`eq-jacobian-control-vehicle` and the Jacobians of :eq:`eq-b19` (B19), in monomials: the
+    motion is linear in them, so each column is one monomial's matrix times the lifted state z (B, 11 + 6 n).
+    """
+    matrices = LANDMARK_MATRICES_AS_PRINTED if variant.b18_as_printed else LANDMARK_MATRICES
+    J_R = np.einsum("kij,bj->bik", VEHICLE_MATRICES[1:], z[:, :VEHICLE])
+    J_L = np.einsum("kij,bnj->bnik", matrices[1:], z[:, VEHICLE:].reshape(len(z), -1, LANDMARK))
+    return np.concatenate([J_R, J_L.reshape(len(z), -1, len(MONOMIALS) - 1)], 1)
+
+
 def measurement_matrix(slots: ArrayLike, landmarks: int) -> Array:
     """Constant measurement matrix (2 m, 11 + 6 n) of the landmarks in map places ``slots`` (m,).
 

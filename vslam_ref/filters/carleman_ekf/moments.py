@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.filters.carleman_ekf import lift
+from vslam_ref.filters.estimates import checked_moments
 from vslam_ref.filters.vehicle import Increment
 
 Term = tuple[complex, int, int, int]
@@ -109,16 +110,9 @@ def _gaussian_moments(
     return first, second
 
 
-def check_kind(name: str, kind: str) -> str:
-    """Return ``kind`` or raise a ValueError that names the choices."""
-    if kind not in ("first_order", "gaussian"):
-        raise ValueError(f"{name}={kind!r}: must be 'first_order' or 'gaussian'")
-    return kind
-
-
 def lifted_start(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
     """Mean (B, 11) and covariance (B, 11, 11) of the lifted start pose N(mean (B, 3), cov (B, 3, 3))."""
-    if check_kind("start", kind) == "gaussian":
+    if checked_moments("start", kind) == "gaussian":
         return _gaussian_moments(_LIFTED_VEHICLE, mean, cov)
     J = lift.lift_vehicle_jacobian(mean)
     return lift.lift_vehicle(mean), J @ cov @ J.swapaxes(1, 2)
@@ -151,7 +145,7 @@ def control_moments(increment: Increment, kind: str, product_of_means: bool = Fa
         With ``gaussian`` only: put products of E[u] into the quadratic monomials.  Wrong: the mean of
         (sin, cos) is shorter than 1, and its square loses z5 + z6 step by step.
     """
-    if check_kind("control", kind) == "first_order":
+    if checked_moments("control", kind) == "first_order":
         return _first_order(increment)
     mean = np.stack([increment.ds, np.zeros_like(increment.ds), increment.dalpha], -1)
     cov = np.zeros((len(mean), 3, 3))

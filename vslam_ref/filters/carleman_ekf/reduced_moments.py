@@ -28,8 +28,6 @@ def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
         J[:, 0, 0] = J[:, 1, 1] = 1.0
         J[:, 2, 2], J[:, 3, 2] = c, -s
         return np.stack([x, y, s, c], -1), J @ cov @ J.swapaxes(1, 2)
-    if kind != "gaussian":
-        raise ValueError(f"start={kind!r}: must be 'first_order' or 'gaussian'")
     v = cov[:, 2, 2]
     shrink = np.exp(-v / 2)
     P = np.zeros((len(mean), 4, 4))

@@ -12,7 +12,6 @@ chi-squared quantile throws away what would have put the filter right, and then 
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -209,21 +208,19 @@ class _Runner:
         self.filter = filter
         self.gate = gate
         self.records: list[Any] = []
-        self._known: set[int] = set()
         self._seen: list[tuple[float, int, Array, Array, Array, bool]] = []
 
     def see(self, time: float, identity: int, polar: Array, z: Array, cov_z: Array) -> None:
-        """Try an update on a copy; the copy takes over if the gate lets it pass."""
-        trial = copy.deepcopy(self.filter) if identity in self._known else self.filter
-        found = trial.update([identity], z[None, None], cov_z)
-        self._known.add(identity)
-        if found is None:
-            return
-        y, S = found.innovation[0], found.S[0]
-        passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
-        self._seen.append((time, identity, polar, y, S, passed))
+        """Use a sighting if the gate lets its innovation pass; a new landmark has none."""
+        sighting = [identity], z[None, None], cov_z
+        asked = self.filter.innovation(*sighting)
+        passed = True
+        if asked is not None:
+            y, S = asked.innovation[0], asked.S[0]
+            passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
+            self._seen.append((time, identity, polar, y, S, passed))
         if passed:
-            self.filter = trial
+            self.filter.update(*sighting)
 
     def seen(self) -> Seen:
         """Everything seen, as arrays."""
