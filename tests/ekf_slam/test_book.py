@@ -95,7 +95,7 @@ def test_every_changed_sign_shows(
     drive = new_drive(steps=25)
     slam = EkfSlam(drive.mean, drive.cov)
     drive.feed(slam)
-    control = np.array([1.2, 0.3]), np.array([[0.04, 0.003], [0.003, 0.002]]), 2.0, 0.1
+    control = np.array([1.2, 0.6]), np.array([[0.04, 0.003], [0.003, 0.2]]), 2.0, 0.1
     increment = vehicle.ackermann_increment(control[0][None], *control[1:])
     missed, tried = [], 0
     for line, module in flips(book):

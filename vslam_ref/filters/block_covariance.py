@@ -11,11 +11,11 @@ measurement of k numbers costs O(k n^2).  No full F, H or K H is ever formed.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray, transpose
+from vslam_ref.arrays import Array, IntArray
 
 
 class State(NamedTuple):
@@ -49,17 +49,31 @@ class Blocks:
         States b per landmark.
     capacity : int
         Landmarks to make room for at first; more are made on demand.
+
+    Attributes
+    ----------
+    state : State
+        Views of all blocks.
     """
 
     def __init__(self, mean: Array, cov: Array, landmark_states: int, capacity: int) -> None:
         (batch, p), room = mean.shape, capacity * landmark_states
         self.b = landmark_states
-        self.x_p = np.array(mean, dtype=np.float64)
-        self.P_pp = np.array(cov, dtype=np.float64)
         self._x_m = np.zeros((batch, room))
         self._P_pm = np.zeros((batch, p, room))
         self._P_mm = np.zeros((batch, room, room))
         self._index: dict[int, int] = {}
+        self._look(np.array(mean, dtype=np.float64), np.array(cov, dtype=np.float64))
+
+    def _look(self, x_p: Array, P_pp: Array) -> None:
+        """Set ``state``: views of all blocks, without the room that is still free."""
+        M = self.b * self.n
+        self.state = State(x_p, self._x_m[:, :M], P_pp, self._P_pm[:, :, :M], self._P_mm[:, :M, :M])
+
+    def __setstate__(self, parts: dict[str, Any]) -> None:
+        """A copy looks at its own arrays."""
+        self.__dict__.update(parts)
+        self._look(self.x_p, self.P_pp)
 
     @property
     def n(self) -> int:
@@ -67,25 +81,28 @@ class Blocks:
         return len(self._index)
 
     @property
-    def state(self) -> State:
-        """Views of all blocks, without the room that is still free."""
-        M = self.b * len(self._index)
-        x_m, P_pm, P_mm = self._x_m[:, :M], self._P_pm[:, :, :M], self._P_mm[:, :M, :M]
-        return State(self.x_p, x_m, self.P_pp, P_pm, P_mm)
+    def x_p(self) -> Array:
+        """Mean of the pose (B, p)."""
+        return self.state.x_p
 
     @property
     def x_m(self) -> Array:
-        """Mean of the map (B, M), a view."""
+        """Mean of the map (B, M)."""
         return self.state.x_m
 
     @property
+    def P_pp(self) -> Array:
+        """Covariance of the pose (B, p, p)."""
+        return self.state.P_pp
+
+    @property
     def P_pm(self) -> Array:
-        """Cross covariance of pose and map (B, p, M), a view."""
+        """Cross covariance of pose and map (B, p, M)."""
         return self.state.P_pm
 
     @property
     def P_mm(self) -> Array:
-        """Covariance of the map (B, M, M), a view."""
+        """Covariance of the map (B, M, M)."""
         return self.state.P_mm
 
     @property
@@ -114,14 +131,15 @@ class Blocks:
         old, new = self.n * self.b, (self.n + len(ids)) * self.b
         self._make_room(new)
         P_pp, P_pm = self.P_pp, self._P_pm[:, :, :old]
-        cov, cross = G @ P_pp @ transpose(G), transpose(P_pm) @ transpose(G)
+        G_T = G.swapaxes(1, 2)
+        cov, cross = G @ P_pp @ G_T, P_pm.swapaxes(1, 2) @ G_T  # eq-augment
         diagonal_blocks(cov, self.b)[...] += noise
         self._x_m[:, old:new] = mean
-        self._P_pm[:, :, old:new] = P_pp @ transpose(G)
-        self._P_mm[:, :old, old:new], self._P_mm[:, old:new, :old] = cross, transpose(cross)
+        self._P_pm[:, :, old:new] = P_pp @ G_T
+        self._P_mm[:, :old, old:new], self._P_mm[:, old:new, :old] = cross, cross.swapaxes(1, 2)
         self._P_mm[:, old:new, old:new] = cov
-        for i in ids.tolist():
-            self._index[i] = self.b * len(self._index)
+        self._index |= {i: old + self.b * j for j, i in enumerate(ids.tolist())}
+        self._look(self.x_p, P_pp)
 
     def _make_room(self, states: int) -> None:
         """Twice the room at least, when there is not enough for so many map states."""
@@ -136,7 +154,7 @@ class Blocks:
     def full(self) -> tuple[Array, Array]:
         """Mean (B, p + M) and covariance (B, p + M, p + M) as whole arrays (copies)."""
         x_p, x_m, P_pp, P_pm, P_mm = self.state
-        return np.concatenate([x_p, x_m], 1), np.block([[P_pp, P_pm], [transpose(P_pm), P_mm]])
+        return np.concatenate([x_p, x_m], 1), np.block([[P_pp, P_pm], [P_pm.swapaxes(1, 2), P_mm]])
 
 
 class Expected(NamedTuple):
@@ -169,13 +187,47 @@ def kalman_update_in_place(state: State, seen: Expected) -> None:
     both = np.concatenate([seen.HP, seen.innovation[:, :, None]], 2)
     both = np.linalg.inv(np.linalg.cholesky(seen.S)) @ both
     W, y = both[:, :, :-1], both[:, :, -1:]
-    step = (transpose(y) @ W)[:, 0]
+    step = (y.swapaxes(1, 2) @ W)[:, 0]
     x_p += step[:, :p]  # eq-gain
     x_m += step[:, p:]
-    WW = transpose(W) @ W
+    WW = W.swapaxes(1, 2) @ W
     P_pp -= WW[:, :p, :p]
     P_pm -= WW[:, :p, p:]
     P_mm -= WW[:, p:, p:]
+
+
+def expected_landmarks(
+    state: State, columns: IntArray, H_p: Array, H_l: Array, innovation: Array, cov_z: Array
+) -> Expected:
+    """H P and S = H P H^T + cov_z of m landmarks; H is zero elsewhere.  Nothing is changed.
+
+    Implements :eq:`eq-innovation`.
+
+    Parameters
+    ----------
+    state : State
+    columns : ndarray of int, shape (m,)
+        First map column of each landmark.
+    H_p : ndarray, shape (B, m, 2, p) or (m, 2, p)
+        Jacobian of each landmark's measurement in the pose.
+    H_l : ndarray, shape (B, m, 2, 2) or (m, 2, 2)
+        Jacobian in the two map states that start at ``columns``.
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted.
+    cov_z : ndarray, shape (m, 2, 2)
+        Measurement covariance of each landmark; the measurements are independent.
+    """
+    (B, k), p, pairs = innovation.shape, state.x_p.shape[1], map_columns(columns)
+    H = np.zeros((B, k, p + k))  # in the pose and the landmarks seen
+    H[:, :, :p] = H_p.reshape(-1, k, p)
+    diagonal_blocks(H[:, :, p:])[...] = H_l
+    rows = np.empty((B, p + k, p + state.x_m.shape[1]))  # the rows of P that H meets
+    rows[:, :p, :p], rows[:, :p, p:] = state.P_pp, state.P_pm
+    rows[:, p:, :p], rows[:, p:, p:] = state.P_pm.take(pairs, 2).swapaxes(1, 2), state.P_mm.take(pairs, 1)
+    HP = H @ rows
+    S = HP.take(np.concatenate([np.arange(p), p + pairs]), 2) @ H.swapaxes(1, 2)
+    diagonal_blocks(S)[...] += cov_z  # eq-innovation
+    return Expected(innovation, S, HP)
 
 
 def map_columns(columns: IntArray) -> IntArray:

@@ -31,15 +31,12 @@ from vslam_ref.filters.block_covariance import (
     Expected,
     State,
     diagonal_blocks,
+    expected_landmarks,
     kalman_update_in_place,
-    map_columns,
 )
 from vslam_ref.filters.estimates import Innovation, MapEstimate, PoseEstimate, SlamFilter, as_batch
 from vslam_ref.filters.observation import ObservationJacobians, PlacementJacobians
 from vslam_ref.geometry import se2, so2
-
-POSE = np.arange(3)
-
 
 # -- the steps, on the arrays of a batch ---------------------------------------------------------------
 
@@ -67,7 +64,7 @@ def move_covariance_in_place(state: State, F: Array, G: Array, Q: Array) -> None
 
     Implements :eq:`eq-predict`.
     """
-    state.P_pp[...] = F @ state.P_pp @ transpose(F) + G @ Q @ transpose(G)  # eq-predict
+    state.P_pp[...] = F @ state.P_pp @ F.swapaxes(-1, -2) + G @ Q @ G.swapaxes(-1, -2)  # eq-predict
     state.P_pm[...] = F @ state.P_pm
 
 
@@ -107,19 +104,11 @@ def expected(
 
     Implements :eq:`eq-innovation`.  Other parameters as for :func:`ekf_update_in_place`; nothing is changed.
     """
-    (B, m, _), pairs = z.shape, map_columns(columns)
-    landmarks = state.x_m.take(pairs, 1).reshape(B, m, 2)
+    B, m, _ = z.shape
+    landmarks = state.x_m.reshape(B, -1, 2)[:, columns // 2]
     here = observation.vehicle_from_world_with_jacobians(state.x_p[:, None], landmarks)
-    H = np.zeros((B, 2 * m, 3 + 2 * m))  # in the pose and the landmarks seen; elsewhere it is zero
-    H[:, :, :3] = (at or here).J_pose.reshape(-1, 2 * m, 3)
-    diagonal_blocks(H[:, :, 3:])[...] = (at or here).J_landmark
-    rows = np.empty((B, 3 + 2 * m, 3 + state.x_m.shape[1]))  # the rows of P that H meets
-    rows[:, :3, :3], rows[:, :3, 3:] = state.P_pp, state.P_pm
-    rows[:, 3:, :3], rows[:, 3:, 3:] = transpose(state.P_pm.take(pairs, 2)), state.P_mm.take(pairs, 1)
-    HP = H @ rows
-    S = HP.take(np.concatenate([POSE, 3 + pairs]), 2) @ transpose(H)
-    diagonal_blocks(S)[...] += cov_z  # eq-innovation
-    return Expected((z - here.value).reshape(B, 2 * m), S, HP)
+    H, innovation = at or here, (z - here.value).reshape(B, 2 * m)  # eq-b20
+    return expected_landmarks(state, columns, H.J_pose, H.J_landmark, innovation, cov_z)
 
 
 def correct_in_place(state: State, seen: Expected) -> None:
@@ -155,13 +144,11 @@ class EkfSlam(SlamFilter):
 
     def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32) -> None:
         self.blocks = Blocks(*as_batch(mean, cov), landmark_states=2, capacity=capacity)
+        self.runs = len(self.blocks.x_p)
 
     def predict(self, increment: vehicle.Increment) -> None:
         """Move the pose by an increment; the map stays."""
         ekf_predict_in_place(self.blocks.state, increment)
-
-    def _runs(self) -> int:
-        return len(self.blocks.x_p)
 
     def _columns(self, ids: IntArray) -> IntArray:
         return self.blocks.columns(ids)

@@ -39,7 +39,14 @@ class SlamFilter(ABC):
 
     A filter says how it moves, how it uses landmarks of its map, and how a new one enters.  Here stand the
     checks, and which landmark of a sighting is known and which is new.
+
+    Attributes
+    ----------
+    runs : int
+        Runs B of the batch.
     """
+
+    runs: int
 
     @abstractmethod
     def predict(self, increment: Increment) -> None:
@@ -56,10 +63,6 @@ class SlamFilter(ABC):
     @abstractmethod
     def _columns(self, ids: IntArray) -> IntArray:
         """Place (m,) of each landmark in the map, -1 for one that is not in it."""
-
-    @abstractmethod
-    def _runs(self) -> int:
-        """Runs B of the batch."""
 
     @abstractmethod
     def _innovation(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
@@ -95,7 +98,7 @@ class SlamFilter(ABC):
         ValueError
             On other shapes, an identity twice, or numbers that are not finite; nothing is changed then.
         """
-        ids, z, cov_z = checked_measurement(ids, z, cov_z, self._runs())
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, self.runs)
         columns = self._columns(ids)
         known = columns >= 0
         if len(ids) and known.all():  # the common case, without copies
@@ -110,7 +113,7 @@ class SlamFilter(ABC):
 
         Parameters, errors and result as for :meth:`update`; landmarks that are not in the map are left out.
         """
-        ids, z, cov_z = checked_measurement(ids, z, cov_z, self._runs())
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, self.runs)
         columns = self._columns(ids)
         known = columns >= 0
         return self._innovation(columns[known], z[:, known], cov_z[known]) if known.any() else None

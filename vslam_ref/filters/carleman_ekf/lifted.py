@@ -68,6 +68,7 @@ class LiftedCarlemanEkf(SlamFilter):
         self._z, self._P = np.zeros((len(z), room)), np.zeros((len(z), room, room))
         self._z[:, _R], self._P[:, _R, _R] = z, P
         self._slots: dict[int, int] = {}
+        self.runs = len(z)
         self._start_accumulation()
 
     @classmethod
@@ -144,9 +145,6 @@ class LiftedCarlemanEkf(SlamFilter):
         self._start_accumulation()
 
     # -- measurement -----------------------------------------------------------------------------
-
-    def _runs(self) -> int:
-        return len(self._z)
 
     def _columns(self, ids: IntArray) -> IntArray:
         return np.array([self._slots.get(i, -1) for i in ids.tolist()], dtype=np.int64)

@@ -85,13 +85,16 @@ class ReducedCarlemanEkf(SlamFilter):
         sizes = (len(x), WAITING)
         self._waiting = Increment(np.empty(sizes), np.empty(sizes), np.empty((*sizes, 2, 2)))
         self._waits = 0
+        self.runs = len(x)
         self._noisy = False  # whether P_a holds noise that the map has not had yet
 
     @property
     def blocks(self) -> Blocks:
         """Mean and covariance; all increments so far are in the pose's blocks."""
         self._settle()
-        self._blocks.P_pp = self._P_a[:, :4, :4]
+        state = self._blocks.state
+        if state.P_pp.base is not self._P_a:  # after an append, and in a copy
+            self._blocks.state = state._replace(P_pp=self._P_a[:, :4, :4])
         return self._blocks
 
     def state(self) -> tuple[Array, Array]:
@@ -141,9 +144,6 @@ class ReducedCarlemanEkf(SlamFilter):
             reduced_apply_in_place(b.state, b.b, self._P_a, self._frame)
             self._noisy = False
         return b
-
-    def _runs(self) -> int:
-        return len(self._frame)
 
     def _columns(self, ids: IntArray) -> IntArray:
         return self._blocks.columns(ids)
