@@ -25,7 +25,7 @@ from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.worlds.circle import CircleConfig, make_circle
 
 increment = vehicle.Increment(np.array([0.5]), np.array([0.2]), np.diag([0.01, 0.02])[None])
-truth = Truth(np.array([[1.0, 2.0, 0.7], [1.38, 2.32, 0.9]]), np.array([[3.0, 4.0]]))
+truth = Truth(np.array([[1.0, 2.0, 0.7], [1.38, 2.32, 0.9], [1.7, 2.7, 1.1]]), np.array([[3.0, 4.0]]))
 answers = {"propagate": vehicle.propagate([1.0, 2.0, 0.7], [0.5, 0.2]).tolist()}
 for name, slam in (
     ("ekf", EkfSlam([1.0, 2.0, 0.7], 0.1 * np.eye(3))),
@@ -34,9 +34,10 @@ for name, slam in (
 ):
     slam.update([0], [[[2.0, 1.0]]], 0.01 * np.eye(2))
     slam.predict(increment)
+    slam.predict(increment)
     mean, cov = slam.pose()
     answers[name] = [*mean[0].tolist(), *cov[0].ravel().tolist(), *slam.blocks.P_pm[0].ravel().tolist()]
-answers["circle"] = make_circle(CircleConfig(steps=3)).poses.ravel().tolist()
+answers["circle"] = make_circle(CircleConfig(steps=3)).T_world_vehicle.ravel().tolist()
 print(json.dumps(answers))
 """
 VALUE = ("value[..., 1] = y + left", "value[..., 1] = y - left")
@@ -71,7 +72,7 @@ def package() -> Path:
 def test_an_edited_model_changes_the_filters(
     package: Path, tmp_path: Path, edit: tuple[str, str], changed: set[str]
 ) -> None:
-    """The circle's heading turns, so that its path leaves the axis; 0.01 is far above rounding."""
+    """Two steps: headings turn, so that every path leaves its axis; 1e-4 is far above rounding."""
     copy = tmp_path / "vslam_ref"
     shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__", "experiments", "conformance"))
     before = answers(tmp_path)

@@ -93,7 +93,7 @@ def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
     pose[:, 2] = so2.wrap(pose[:, 2])
     return Truth(
         times=poses.values[:, 0] - log.clock_start,
-        poses=pose,
+        T_world_vehicle=pose,
         max_gap=TRUTH_GAP,
         ids=subjects,
         landmarks=marks.values[:, 1:3],

@@ -127,9 +127,11 @@ def _sighting(pose: Array, ids: IntArray, places: Array, landmarks: int) -> Arra
     return H.reshape(2 * len(ids), H.shape[2])
 
 
-def linearise_truth(poses: ArrayLike, landmarks: ArrayLike, sightings: Sequence[ArrayLike]) -> LinearisedRun:
+def linearise_truth(
+    T_world_vehicle: ArrayLike, landmarks: ArrayLike, sightings: Sequence[ArrayLike]
+) -> LinearisedRun:
     """Jacobians at true poses (T + 1, 3) and landmarks (n, 2); ``sightings[k]``: ids seen from pose k + 1."""
-    poses, landmarks = np.asarray(poses, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
+    poses, landmarks = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     F, H = [], []
     for k, seen in enumerate(sightings):
         ids = np.asarray(seen, dtype=np.int64)
@@ -180,12 +182,12 @@ def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "firs
     return LinearisedRun(tuple(F), tuple(H))
 
 
-def lift_tangent(pose: ArrayLike, landmarks: ArrayLike) -> Array:
+def lift_tangent(T_world_vehicle: ArrayLike, landmarks: ArrayLike) -> Array:
     """Derivative (11 + 6 n, 3 + 2 n) of the lift in pose (3,) and landmarks (n, 2): B14 and B15.
 
     Its columns span the tangent space of the manifold on which lifted states of real vehicles lie.
     """
-    pose, places = np.asarray(pose, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
+    pose, places = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     n, s, c = len(places), np.sin(pose[2]), np.cos(pose[2])
     J = np.zeros((lift.VEHICLE + lift.LANDMARK * n, 3 + 2 * n))
     J[: lift.VEHICLE, :3] = lift.lift_vehicle_jacobian(pose)

@@ -188,7 +188,7 @@ def propagate_with_jacobians(T_world_vehicle: ArrayLike, increment: ArrayLike) -
     return motion_model(pose, inc[..., 0], inc[..., 1])
 
 
-def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: float) -> Array:
+def front_wheel_step(T_world_vehicle: ArrayLike, control: ArrayLike, wheelbase: float, dt: float) -> Array:
     """Move a pose by the front-wheel model of Bailey's simulator, the alternative to B4.
 
     x += V dt cos(theta + G), y += V dt sin(theta + G), theta += V dt sin(G) / WB: the speed V is that
@@ -198,12 +198,12 @@ def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: 
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
+    T_world_vehicle : array_like, shape (..., 3)
         Pose of the front wheel's contact point, heading of the vehicle's axis.
     control : array_like, shape (..., 2)
         Front wheel speed V (m/s) and steering angle G (rad).
     """
-    pose, u = np.asarray(pose, dtype=np.float64), np.asarray(control, dtype=np.float64)
+    pose, u = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(control, dtype=np.float64)
     step, direction = u[..., 0] * dt, pose[..., 2] + u[..., 1]
     turn = step * np.sin(u[..., 1]) / wheelbase
     return np.stack(

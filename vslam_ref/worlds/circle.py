@@ -69,11 +69,26 @@ class CircleConfig:
 
 
 class Circle(NamedTuple):
-    """Truth: times (T + 1,), poses (T + 1, 3), controls (T, 2) = (v, omega), landmarks (n, 2), sightings."""
+    """Truth of a course.
+
+    Attributes
+    ----------
+    config : CircleConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    controls : ndarray, shape (T, 2)
+        v (m/s) and omega (rad/s).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        What is seen when, without noise.
+    """
 
     config: CircleConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]

@@ -96,11 +96,26 @@ class Sighting(NamedTuple):
 
 
 class VehicleField(NamedTuple):
-    """Truth of a course: times (T + 1,), poses (T + 1, 3), controls (T, 2), landmarks (n, 2), sightings."""
+    """Truth of a course.
+
+    Attributes
+    ----------
+    config : VehicleFieldConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    controls : ndarray, shape (T, 2)
+        Speed v (m/s) and steering angle phi (rad).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        What is seen when, without noise.
+    """
 
     config: VehicleFieldConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]

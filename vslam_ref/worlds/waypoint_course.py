@@ -87,14 +87,26 @@ class WaypointConfig:
 
 
 class WaypointCourse(NamedTuple):
-    """Truth: times (T + 1,), poses (T + 1, 3) of the rear axle, controls (T, 2) = (V, G), landmarks (n, 2).
+    """Truth of a course.
 
-    ``sightings`` hold range and bearing (m, 2), metres and radians.
+    Attributes
+    ----------
+    config : WaypointConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta) of the rear axle, metres and radians.
+    controls : ndarray, shape (T, 2)
+        Front wheel speed V (m/s) and steering angle G (rad).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        Range and bearing (m, 2), metres and radians, without noise.
     """
 
     config: WaypointConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]

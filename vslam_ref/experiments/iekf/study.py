@@ -162,7 +162,7 @@ def make_filter(name: str, mean: Array, cov: Array, config: StudyConfig, world: 
     if name == "ekf-anchored":
         return AnchoredEkf(mean, cov, n)
     if name == "ekf-ideal":
-        return IdealEkf(mean, cov, Truth(world.poses, world.landmarks), n)
+        return IdealEkf(mean, cov, Truth(world.T_world_vehicle, world.landmarks), n)
     return EkfSlam(mean, cov, n)
 
 
@@ -173,7 +173,7 @@ def simulate(task: Task) -> RunArrays:
     noise = run_noise(config, control, task.first, task.size)
     scale = config.control_scale if control else 1.0
     p0 = config.p0(task.p0) * scale**2
-    start = world.poses[0] + noise.start * np.sqrt(p0)
+    start = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
     slam = make_filter("ekf" if control else task.filter, start, np.diag(p0), config, world)
     return drive(slam, world, noise, scale)
 
@@ -208,8 +208,8 @@ def drive(slam: SlamFilter, world: VehicleField, noise: Noise, scale: float = 1.
                 value = nis(*innovation).value / innovation.innovation.shape[1]
                 innovations.append(value)
         mean[k], cov[k] = slam.pose()
-    error = pose_error(world.poses[:, None], mean)
-    square = nees_pose(np.broadcast_to(world.poses[:, None], mean.shape), mean, cov).value
+    error = pose_error(world.T_world_vehicle[:, None], mean)
+    square = nees_pose(np.broadcast_to(world.T_world_vehicle[:, None], mean.shape), mean, cov).value
     position = np.hypot(error[..., 0], error[..., 1])
     return RunArrays(square.T.copy(), position.T.copy(), error[..., 2].T.copy(), np.array(innovations).T)
 

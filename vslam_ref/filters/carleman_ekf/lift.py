@@ -88,16 +88,16 @@ LANDMARK_MATRICES = _matrices(_LANDMARK_ROWS)
 LANDMARK_MATRICES_AS_PRINTED = _matrices((*_LANDMARK_ROWS[:5], _LANDMARK_ROW_6_AS_PRINTED))
 
 
-def lift_vehicle(pose: ArrayLike) -> Array:
+def lift_vehicle(T_world_vehicle: ArrayLike) -> Array:
     """Lift poses (..., 3) to the 11 vehicle states (..., 11). Implements :eq:`eq-b14` (B14)."""
-    pose = np.asarray(pose, dtype=np.float64)
+    pose = np.asarray(T_world_vehicle, dtype=np.float64)
     x, y, s, c = pose[..., 0], pose[..., 1], np.sin(pose[..., 2]), np.cos(pose[..., 2])
     return np.stack([x, y, s, c, s * s, c * c, x * s, x * c, y * s, y * c, s * c], -1)
 
 
-def lift_vehicle_jacobian(pose: ArrayLike) -> Array:
+def lift_vehicle_jacobian(T_world_vehicle: ArrayLike) -> Array:
     """Jacobian (..., 11, 3) of :func:`lift_vehicle` in (x, y, theta)."""
-    pose = np.asarray(pose, dtype=np.float64)
+    pose = np.asarray(T_world_vehicle, dtype=np.float64)
     x, y, s, c = pose[..., 0], pose[..., 1], np.sin(pose[..., 2]), np.cos(pose[..., 2])
     J = np.zeros((*pose.shape[:-1], VEHICLE, 3))
     J[..., 0, 0] = J[..., 1, 1] = 1.0
@@ -108,9 +108,9 @@ def lift_vehicle_jacobian(pose: ArrayLike) -> Array:
     return J
 
 
-def lift_landmark(pose: ArrayLike, landmark: ArrayLike) -> Array:
+def lift_landmark(T_world_vehicle: ArrayLike, landmark: ArrayLike) -> Array:
     """Lift landmarks (..., 2), seen from poses (..., 3), to (..., 6). Implements :eq:`eq-b15` (B15)."""
-    pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
+    pose, landmark = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
     x, y, theta = np.broadcast_arrays(landmark[..., 0], landmark[..., 1], pose[..., 2])
     s, c = np.sin(theta), np.cos(theta)
     return np.stack([x, y, s * x, c * x, s * y, c * y], -1)

@@ -24,6 +24,7 @@ from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import MapEstimate, SlamFilter
 from vslam_ref.filters.vehicle import Increment
+from vslam_ref.metrics.consistency import nis
 from vslam_ref.systems.slam_log.calibration import Calibration
 from vslam_ref.systems.slam_log.log import SlamLog
 from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
@@ -109,8 +110,7 @@ class Seen(NamedTuple):
     @property
     def nis(self) -> Array:
         """Normalised innovation squared of each, shape (N,)."""
-        weighted = np.linalg.solve(self.S, self.innovation[:, :, None])
-        return np.asarray(np.sum(self.innovation[:, :, None] * weighted, (1, 2)))
+        return nis(self.innovation, self.S).value
 
 
 class LogRun(NamedTuple):
@@ -121,7 +121,10 @@ class LogRun(NamedTuple):
     filter : str
     times : ndarray, shape (R,)
         Records, seconds.
-    poses, covs : ndarray, shapes (R, 3) and (R, 3, 3)
+    T_run_vehicle : ndarray, shape (R, 3)
+        Estimated poses (x, y, theta), metres and radians, in the frame of the start.
+    covs : ndarray, shape (R, 3, 3)
+        Their covariances.
     map : MapEstimate
         Batch of one.
     seen : Seen
@@ -129,7 +132,7 @@ class LogRun(NamedTuple):
 
     filter: str
     times: Array
-    poses: Array
+    T_run_vehicle: Array
     covs: Array
     map: MapEstimate
     seen: Seen
