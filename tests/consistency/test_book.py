@@ -41,6 +41,15 @@ def test_nees(seed: int, d: int) -> None:
     assert abs(book.nees(e, P) - fast) < 10 * 2.2e-16 * np.linalg.cond(P) * max(1.0, fast)
 
 
+def test_moments_of_an_honest_filter() -> None:
+    """Mean d and variance 2 d; 4000 runs of the honest walk keep to them within 4 standard deviations."""
+    mean, variance = book.expected_nees(3)
+    assert (mean, variance) == (3.0, 6.0)
+    truth, estimate, P = samples(4000)
+    q = consistency.nees_pose(truth, estimate, P).value[:, -1]
+    assert abs(q.mean() - mean) < 4 * np.sqrt(variance / 4000)
+
+
 def test_monte_carlo_and_its_mean() -> None:
     q, (truth, mean, P) = book.monte_carlo(one_run, 17, 20), samples(20)
     fast = consistency.nees_pose(truth, mean, P).value

@@ -175,6 +175,12 @@ def see(b: Belief, ids: Sequence[int], z: Array, cov_z: Array, lifted: bool) -> 
     return b
 
 
+def reduce(b: Belief) -> Belief:
+    """What a lifted belief says of x, y, sin, cos and of r_i, the landmarks in the vehicle's axes."""
+    T = np.vstack([np.eye(4, len(b.Z)), measurement_matrix(b, b.ids, True)])  # eq-reduction-map
+    return Belief(T @ b.Z, T @ b.P @ T.T, b.ids)  # eq-reduction, eq-reduction-matrix
+
+
 def pose(b: Belief) -> tuple[Array, Array]:
     """(x, y, atan2(sin, cos)) and its covariance (3, 3), to first order."""
     x, y, s, c = b.Z[:4]

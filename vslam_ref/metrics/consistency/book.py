@@ -36,6 +36,11 @@ def nees(e: Array, P: Array) -> float:
     return float(e @ np.linalg.inv(P) @ e)  # eq-nees
 
 
+def expected_nees(dof: int = 3) -> tuple[float, float]:
+    """Mean and variance of an honest filter's NEES: chi-squared with ``dof`` degrees of freedom."""
+    return float(chi2(dof).mean()), float(chi2(dof).var())  # eq-nees-moments
+
+
 def monte_carlo(one_run: Run, seed: int, runs: int) -> Array:
     """NEES (M, T) of M independent runs at every time."""
     q = []
