@@ -57,7 +57,7 @@ class Blocks:
     """
 
     def __init__(self, mean: Array, cov: Array, landmark_states: int, capacity: int) -> None:
-        (batch, p), room = mean.shape, capacity * landmark_states
+        (batch, p), room = mean.shape, max(capacity, 1) * landmark_states
         self.b = landmark_states
         self._x_m = np.zeros((batch, room))
         self._P_pm = np.zeros((batch, p, room))

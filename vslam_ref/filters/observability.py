@@ -77,8 +77,8 @@ class Nullity(NamedTuple):
 def observability_matrix(run: LinearisedRun) -> Array:
     """Local observability matrix (rows, D): every H_k times the product of the F before it."""
     if len(run.transitions) != len(run.measurements) or not run.transitions:
-        told = f"{len(run.transitions)} transitions and {len(run.measurements)} sightings"
-        raise ValueError(f"{told}: need as many, and at least one")
+        given = f"{len(run.transitions)} transitions and {len(run.measurements)} sightings"
+        raise ValueError(f"{given}: need as many, and at least one")
     carried = np.eye(len(run.transitions[0]))
     rows = []
     for F, H in zip(run.transitions, run.measurements, strict=True):

@@ -62,7 +62,7 @@ def vehicle_from_world_with_jacobians(
     value, J_pose, J_landmark = np.empty(d.shape), np.empty((*d.shape, 3)), np.empty((*d.shape, 2))
     value[..., 0] = c * d[..., 0] + s * d[..., 1]
     value[..., 1] = c * d[..., 1] - s * d[..., 0]
-    J_landmark[..., 0, 0] = J_landmark[..., 1, 1] = c
+    J_landmark[..., 0, 0] = J_landmark[..., 1, 1] = c  # eq-jacobians-measurement
     J_landmark[..., 0, 1] = s
     J_landmark[..., 1, 0] = -s
     J_pose[..., :2] = -J_landmark
@@ -95,7 +95,7 @@ def world_from_vehicle_with_jacobians(
     turned = np.einsum("...ij,...j->...i", J_z, z)
     value = turned + pose[..., :2]
     J_pose = np.zeros((*value.shape[:-1], 2, 3))
-    J_pose[..., 0, 0] = J_pose[..., 1, 1] = 1.0
+    J_pose[..., 0, 0] = J_pose[..., 1, 1] = 1.0  # eq-jacobians-new
     J_pose[..., 0, 2] = -turned[..., 1]
     J_pose[..., 1, 2] = turned[..., 0]
     return PlacementJacobians(value, J_pose, J_z)

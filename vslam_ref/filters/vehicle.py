@@ -82,9 +82,9 @@ def ackermann_with_jacobians(control: ArrayLike, wheelbase: float, dt: float) ->
     u = np.asarray(control, dtype=np.float64)
     v, phi = u[..., 0], u[..., 1]
     tan = np.tan(phi)
-    value = np.stack([v * dt, v * dt * tan / wheelbase], -1)
+    value = np.stack([v * dt, v * dt * tan / wheelbase], -1)  # eq-increment
     J = np.zeros((*u.shape[:-1], 2, 2))
-    J[..., 0, 0] = dt
+    J[..., 0, 0] = dt  # eq-jacobian-drive
     J[..., 1, 0] = dt * tan / wheelbase
     J[..., 1, 1] = v * dt * (1.0 + tan * tan) / wheelbase
     return DriveJacobians(value, J)
@@ -92,6 +92,8 @@ def ackermann_with_jacobians(control: ArrayLike, wheelbase: float, dt: float) ->
 
 def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, dt: float) -> Increment:
     """Increment of noisy Ackermann controls, its covariance mapped to first order.
+
+    Implements :eq:`eq-increment` and :eq:`eq-jacobian-drive`.
 
     Parameters
     ----------
@@ -101,6 +103,11 @@ def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, 
         Covariance of the control noise, (m/s)^2 and rad^2.
     wheelbase, dt : float
         As in :func:`ackermann`.
+
+    Returns
+    -------
+    Increment
+        ds (m), dalpha (rad) and their covariance.
     """
     value, J = ackermann_with_jacobians(control, wheelbase, dt)
     cov = J @ np.asarray(cov_u, dtype=np.float64) @ np.swapaxes(J, -1, -2)

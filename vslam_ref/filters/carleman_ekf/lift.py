@@ -100,7 +100,7 @@ def lift_vehicle_jacobian(T_world_vehicle: ArrayLike) -> Array:
     pose = np.asarray(T_world_vehicle, dtype=np.float64)
     x, y, s, c = pose[..., 0], pose[..., 1], np.sin(pose[..., 2]), np.cos(pose[..., 2])
     J = np.zeros((*pose.shape[:-1], VEHICLE, 3))
-    J[..., 0, 0] = J[..., 1, 1] = 1.0
+    J[..., 0, 0] = J[..., 1, 1] = 1.0  # eq-jacobian-lift
     J[..., 6, 0], J[..., 7, 0] = s, c
     J[..., 8, 1], J[..., 9, 1] = s, c
     slope = [c, -s, 2 * s * c, -2 * s * c, x * c, -x * s, y * c, -y * s, c * c - s * s]
@@ -159,7 +159,7 @@ def placement_matrices(
 ) -> tuple[Array, Array]:
     """Matrices of a new landmark: G_3 in the vehicle states and G_new in the measurement.
 
-    Implements :eq:`eq-b26` (B26) and the Jacobians of :eq:`eq-b28` (B28).
+    Implements :eq:`eq-b26` (B26) and :eq:`eq-jacobians-placement`, the blocks of :eq:`eq-b28` (B28).
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def _mean_of(terms: tuple[Term, ...], mean: Array, cov: Array) -> Array:
     """E of a sum of terms of degree p + q <= 1 under N(mean (B, 3), cov (B, 3, 3)), shape (B,)."""
     total = np.zeros(len(mean), dtype=np.complex128)
     for coefficient, p, q, k in terms:
-        wave = np.exp(1j * k * mean[:, 2] - k * k * cov[:, 2, 2] / 2)
+        wave = np.exp(1j * k * mean[:, 2] - k * k * cov[:, 2, 2] / 2)  # eq-gaussian-moments
         total += coefficient * wave * _shifted(p, q, k, mean, cov)
     return total.real
 
@@ -163,7 +163,7 @@ def _first_order(increment: Increment) -> ControlMoments:
     zero, one = np.zeros_like(ds), np.ones_like(ds)
     along = np.stack([one, zero, zero, zero, zero, zero, s, c], -1)
     turn = np.stack([zero, c, -s, 2 * s * c, c * c - s * s, -2 * s * c, ds * c, -ds * s], -1)
-    factor = np.stack([along, turn], -1) @ _factor_2x2(increment.cov)
+    factor = np.stack([along, turn], -1) @ _factor_2x2(increment.cov)  # eq-noise-first-order
     return ControlMoments(control_monomials(np.stack([ds, s, c], -1)), factor)
 
 

@@ -53,7 +53,7 @@ def control_first_order(increment: Increment) -> tuple[Array, Array]:
     mean[:, 0], mean[:, 1], mean[:, 2], mean[:, 3], mean[:, 4] = increment.ds, m.real, m.imag, t.real, t.imag
     J[:, 0, 0], J[:, 3:, 0] = 1.0, mean[:, 1:3]
     J[:, 1::2, 1], J[:, 2::2, 1] = mean[:, 2::2], -mean[:, 1::2]
-    return mean, J @ increment.cov @ J.swapaxes(1, 2)
+    return mean, J @ increment.cov @ J.swapaxes(1, 2)  # eq-noise-first-order
 
 
 def control_gaussian(increment: Increment) -> tuple[Array, Array]:
@@ -64,7 +64,7 @@ def control_gaussian(increment: Increment) -> tuple[Array, Array]:
     like are divided out, so that no difference of nearly equal numbers is left.
     """
     d, s2, k, v = increment.ds, increment.cov[:, 0, 0], increment.cov[:, 0, 1], increment.cov[:, 1, 1]
-    m = np.exp(-1j * increment.dalpha - v / 2)
+    m = np.exp(-1j * increment.dalpha - v / 2)  # eq-gaussian-moments
     t = (d - 1j * k) * m
     less, keep = np.expm1(-v), np.exp(-v)
     plain_mm, conj_mm = less, -less

@@ -43,6 +43,7 @@ def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array)
     ds, m, t = control[..., 0], control[..., 1] + 1j * control[..., 2], control[..., 3] + 1j * control[..., 4]
     h = x_p[:, 3:] + 1j * x_p[:, 2:3]
     # after control j: c = turned c_0, tau_j = m_j tau_{j-1} + t_j, h_j = e h_0, p_j = p_0 + D h_0
+    # eq-complex-filter, eq-reduced-filter: all controls at once
     turned = m.cumprod(1)
     c, tau = turned * frame[:, :1], turned * (frame[:, 1:2] + (t / turned).cumsum(1))
     e = turned.conj()

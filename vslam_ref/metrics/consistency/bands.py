@@ -30,6 +30,8 @@ class Band(NamedTuple):
 def mean_line(runs: int, dof: int = 3, level: float = 0.95) -> float:
     """One-sided upper line of the mean of ``runs`` independent NEES.
 
+    Implements :eq:`eq-band`.
+
     Parameters
     ----------
     runs : int
@@ -63,6 +65,8 @@ def mean_line(runs: int, dof: int = 3, level: float = 0.95) -> float:
 
 def mean_band(runs: int, dof: int = 3, level: float = 0.95) -> Band:
     """Two-sided band of the mean of ``runs`` independent NEES, equal tails.
+
+    Implements :eq:`eq-band`.
 
     Parameters and errors as for :func:`mean_line`.
 
