@@ -50,9 +50,10 @@ def _add_control_noise(G, cov, N):
             v = 0.0
             for t in range(r):
                 v += G[i, t] * cov[t, q]
-            if v != 0.0:
-                for j in range(i + 1):
-                    N[i, j] += v * G[j, q]
+            if v == 0.0:  # most of G is
+                continue
+            for j in range(i + 1):
+                N[i, j] += v * G[j, q]
 
 
 @njit(cache=True)
@@ -187,6 +188,19 @@ def _add_noise(re, im, NE, even, odd):
 
 
 @njit(cache=True)
+def _add_noise_and_two(re, im, noise, tile, first, second, even, odd):
+    """:func:`_add_noise`, and minus four rows of W; ``first``, ``second`` are W in the columns of the two."""
+    f, g, s, t = noise[0], noise[1], noise[2], noise[3]
+    u, v, w, x = tile[0], tile[1], tile[2], tile[3]
+    p, q, m, n = first[0], first[1], first[2], first[3]
+    for c in range(even.shape[0]):
+        even[c] += (re * f[c] - im * g[c] + s[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+    p, q, m, n = second[0], second[1], second[2], second[3]
+    for c in range(odd.shape[0]):
+        odd[c] += (im * f[c] + re * g[c] + t[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+
+
+@njit(cache=True)
 def _change_map(W, tile, E, NE, noise, b, P_mm):
     """P_mm += E^T N_gg E - W^T W; ``tile`` and ``noise`` are room for tiles of W and of NE.
 
@@ -197,21 +211,12 @@ def _change_map(W, tile, E, NE, noise, b, P_mm):
         hi = min(M, lo + TILE)
         load_tile(W, lo, tile)
         load_tile(NE, lo, noise)
-        f, g, s, t = noise[0], noise[1], noise[2], noise[3]
-        u, v, w, x = tile[0], tile[1], tile[2 % k], tile[3 % k]
         for r in range(0, M, 2):
             even, odd = in_one_piece(P_mm[r])[lo:hi], in_one_piece(P_mm[r + 1])[lo:hi]
             first, re, im = 0, E[0, r], E[0, r + 1]
             if r % b == 0 and k >= 4:
                 first = 4
-                p, q, m, n = W[0, r], W[1, r], W[2, r], W[3, r]
-                for c in range(even.shape[0]):
-                    noise_here = re * f[c] - im * g[c] + s[c]
-                    even[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
-                p, q, m, n = W[0, r + 1], W[1, r + 1], W[2, r + 1], W[3, r + 1]
-                for c in range(odd.shape[0]):
-                    noise_here = im * f[c] + re * g[c] + t[c]
-                    odd[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+                _add_noise_and_two(re, im, noise, tile, W[:4, r], W[:4, r + 1], even, odd)
             elif r % b == 0:
                 _add_noise(re, im, noise, even, odd)
             shrink_rows(W, tile, first, r, even, odd)
@@ -284,11 +289,9 @@ def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovati
             innovation[run, 2 * j] = z[run, j, 0] - predicted.real
             innovation[run, 2 * j + 1] = z[run, j, 1] - predicted.imag
         _turn_pairs(c, columns, W, S[run])
+        W[:, M + 4] = innovation[run]
         for j in range(columns.shape[0]):
-            for r in range(2):
-                W[2 * j + r, M + 4] = innovation[run, 2 * j + r]
-                for q in range(2):
-                    S[run, 2 * j + r, 2 * j + q] += cov_z[j, r, q]
+            S[run, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += cov_z[j]
         whiten(S[run], L, W)
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])
         _change_map(W, tile, E, NE, noise, b, P)
