@@ -93,7 +93,7 @@ def for_ekf_predict(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 
 
 def for_ekf_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    return blocks(rng, B, 3, 2 * n), *seen(rng, B, 2 * n, 2, min(3, n))
+    return blocks(rng, B, 3, 2 * n), *seen(rng, B, 2 * n, 2, min(3, n)), rng.choice([np.inf, 4.0])
 
 
 def reduced_state(rng: Rng, B: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -126,7 +126,8 @@ def for_reduced_apply(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
 def for_reduced_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     b, m = 2 + 2 * (n % 2), min(3, n)
     _, P_a, frame = reduced_state(rng, B)
-    return blocks(rng, B, 4, b * n), b, P_a, frame, *seen(rng, B, b * n, b, m)
+    gate = rng.choice([np.inf, 4.0])
+    return blocks(rng, B, 4, b * n), b, P_a, frame, *seen(rng, B, b * n, b, m), gate
 
 
 def for_grid(rng: Rng, B: int, n: int) -> tuple[Any, ...]:

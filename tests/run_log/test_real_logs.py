@@ -82,9 +82,9 @@ class WrongMeasurementSign(EkfSlam):
         H.J_pose[..., 2] *= -1
         return H
 
-    def _update_known(self, columns: Any, z: Any, cov_z: Any) -> Innovation:
+    def _update_known(self, columns: Any, z: Any, cov_z: Any, gate: float) -> Innovation:
         seen = expected(self.blocks.state, columns, z, cov_z, self._jacobians(columns))
-        kalman_update_in_place(self.blocks.state, seen)
+        kalman_update_in_place(self.blocks.state, seen, gate)
         return Innovation(seen.innovation, seen.S)
 
 
@@ -102,8 +102,8 @@ class NoCrossTerms(EkfSlam):
 class NeverCrossTerms(EkfSlam):
     """Cross covariances of pose and map are forgotten after every update."""
 
-    def update(self, ids: Any, z: Any, cov_z: Any) -> Innovation | None:
-        seen = super().update(ids, z, cov_z)
+    def update(self, ids: Any, z: Any, cov_z: Any, gate: float = np.inf) -> Innovation | None:
+        seen = super().update(ids, z, cov_z, gate)
         self.blocks.P_pm[:] = 0.0
         return seen
 

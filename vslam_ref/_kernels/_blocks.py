@@ -92,6 +92,16 @@ def whiten(S, L, W):
 
 
 @njit(cache=True)
+def apply_gate(gate, W):
+    """Nothing of the whitened W is left where its last column, L^-1 innovation, is longer than the gate."""
+    squared, last = 0.0, W.shape[1] - 1
+    for i in range(W.shape[0]):
+        squared += W[i, last] * W[i, last]
+    if squared > gate:
+        W[:] = 0.0
+
+
+@njit(cache=True)
 def gain(W, x_p, x_m, P_pp, P_pm):
     """X += W^T y, y the last column of the whitened W, and -= W^T W in the pose's blocks."""
     p, M = P_pm.shape

@@ -7,6 +7,7 @@ from numba import njit, types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    apply_gate,
     check_rows,
     gain,
     in_one_piece,
@@ -270,9 +271,9 @@ def _turn_pairs(c, columns, W, S):
 
 @kernel(
     *(changed(2), changed(2), *_MAP[1:]),
-    *(given(1, types.int64), given(3), given(3), changed(2), changed(3)),
+    *(given(1, types.int64), given(3), given(3), types.float64, changed(2), changed(3)),
 )
-def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S):
+def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 5)), np.empty((k, min(M, TILE)))
@@ -293,15 +294,16 @@ def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovati
         for j in range(columns.shape[0]):
             S[run, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += cov_z[j]
         whiten(S[run], L, W)
+        apply_gate(gate, W)
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])
         _change_map(W, tile, E, NE, noise, b, P)
         _forget(P_a[run], frame[run])
 
 
 @unpacks(_update_all)
-def reduced_update_in_place(state, b, P_a, frame, columns, z, cov_z):
+def reduced_update_in_place(state, b, P_a, frame, columns, z, cov_z, gate):
     """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update_in_place`."""
     innovation, S = room_for_innovation(z)
     x_p, x_m, _, P_pm, P_mm = state
-    _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S)
+    _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, innovation, S)
     return innovation, S

@@ -7,6 +7,7 @@ from numba import njit, types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    apply_gate,
     check_rows,
     gain,
     in_one_piece,
@@ -76,7 +77,7 @@ def _in_vehicle_frame(c, s, x_p, x_m, column):
 
 
 @njit(cache=True)
-def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, L, W, tile):
+def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, L, W, tile):
     """Update one run, with H v = R^T (v_landmark - v_position) + (left, -ahead) v_heading."""
     M = x_m.shape[0]
     c, s = np.cos(x_p[2]), np.sin(x_p[2])
@@ -106,6 +107,7 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, L, W, 
             for q in range(2):
                 S[2 * j + r, 2 * j + q] += cov_z[j, r, q]
     whiten(S, L, W)
+    apply_gate(gate, W)
     gain(W, x_p, x_m, P_pp, P_pm)
     shrink_map(W, tile, P_mm)
     x_p[2] = _wrap(x_p[2])
@@ -113,20 +115,20 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, L, W, 
 
 @kernel(
     *(changed(2), changed(2), changed(3), changed(3), changed(3)),
-    *(given(1, types.int64), given(3), given(3), changed(2), changed(3)),
+    *(given(1, types.int64), given(3), given(3), types.float64, changed(2), changed(3)),
 )
-def _update_all(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S):
+def _update_all(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 4)), np.empty((k, min(M, TILE)))
     for b in range(x_p.shape[0]):
         room = innovation[b], S[b], L, W, tile
-        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, *room)
+        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, gate, *room)
 
 
 @unpacks(_update_all)
-def ekf_update_in_place(state, columns, z, cov_z):
+def ekf_update_in_place(state, columns, z, cov_z, gate):
     """Twin of :func:`vslam_ref.filters.ekf_slam.ekf_update_in_place`."""
     innovation, S = room_for_innovation(z)
-    _update_all(*state, columns, z, cov_z, innovation, S)
+    _update_all(*state, columns, z, cov_z, gate, innovation, S)
     return innovation, S

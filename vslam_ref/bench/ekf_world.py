@@ -66,6 +66,6 @@ def array_step(world: World) -> Callable[[], object]:
 
     def step() -> None:
         ekf_predict_in_place(state, increment)
-        ekf_update_in_place(state, columns, z, cov_z)
+        ekf_update_in_place(state, columns, z, cov_z, np.inf)
 
     return step

@@ -168,14 +168,15 @@ class Expected(NamedTuple):
     HP: Array
 
 
-def kalman_update_in_place(state: State, seen: Expected) -> None:
+def kalman_update_in_place(state: State, seen: Expected, gate: float = np.inf) -> None:
     """Kalman update of means and covariance, in place.
 
     Implements :eq:`eq-gain`.  With S = L L^T and W = L^-1 H P ::
 
         x += W^T L^-1 innovation          P -= W^T W
 
-    which is K = P H^T S^-1 without K, and keeps P symmetric to the last bit.
+    which is K = P H^T S^-1 without K, and keeps P symmetric to the last bit.  The normalised innovation
+    squared is the square of L^-1 innovation: a run in which it exceeds ``gate`` stays as it is.
 
     Raises
     ------
@@ -186,6 +187,8 @@ def kalman_update_in_place(state: State, seen: Expected) -> None:
     p = x_p.shape[1]
     both = np.concatenate([seen.HP, seen.innovation[:, :, None]], 2)
     both = np.linalg.inv(np.linalg.cholesky(seen.S)) @ both
+    if gate < np.inf:
+        both[np.sum(both[:, :, -1] ** 2, 1) > gate] = 0.0
     W, y = both[:, :, :-1], both[:, :, -1:]
     step = (y.swapaxes(1, 2) @ W)[:, 0]
     x_p += step[:, :p]  # eq-gain

@@ -69,7 +69,9 @@ def move_covariance_in_place(state: State, F: Array, G: Array, Q: Array) -> None
 
 
 @accelerated("slam:ekf_update_in_place")
-def ekf_update_in_place(state: State, columns: IntArray, z: Array, cov_z: Array) -> tuple[Array, Array]:
+def ekf_update_in_place(
+    state: State, columns: IntArray, z: Array, cov_z: Array, gate: float
+) -> tuple[Array, Array]:
     """Update with m landmarks of the map at once, linearised at the estimate.
 
     Implements :eq:`eq-innovation` and :eq:`eq-gain`.
@@ -84,6 +86,8 @@ def ekf_update_in_place(state: State, columns: IntArray, z: Array, cov_z: Array)
         Relative Cartesian measurements, metres, vehicle frame.
     cov_z : ndarray, shape (m, 2, 2)
         Their covariances, m^2; the measurements are independent.
+    gate : float
+        Runs whose normalised innovation squared is larger stay as they are.
 
     Returns
     -------
@@ -93,7 +97,7 @@ def ekf_update_in_place(state: State, columns: IntArray, z: Array, cov_z: Array)
         Its covariance, m^2.
     """
     seen = expected(state, columns, z, cov_z)
-    correct_in_place(state, seen)
+    correct_in_place(state, seen, gate)
     return seen.innovation, seen.S
 
 
@@ -111,9 +115,9 @@ def expected(
     return expected_landmarks(state, columns, H.J_pose, H.J_landmark, innovation, cov_z)
 
 
-def correct_in_place(state: State, seen: Expected) -> None:
+def correct_in_place(state: State, seen: Expected, gate: float) -> None:
     """Correct means and covariance by an innovation; the heading stays in (-pi, pi]."""
-    kalman_update_in_place(state, seen)
+    kalman_update_in_place(state, seen, gate)
     state.x_p[:, 2] = so2.wrap(state.x_p[:, 2])
 
 
@@ -161,8 +165,8 @@ class EkfSlam(SlamFilter):
         seen = expected(self.blocks.state, columns, z, cov_z, self._jacobians(columns))
         return Innovation(seen.innovation, seen.S)
 
-    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
-        return Innovation(*ekf_update_in_place(self.blocks.state, columns, z, cov_z))
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        return Innovation(*ekf_update_in_place(self.blocks.state, columns, z, cov_z, gate))
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """Add landmarks with their cross covariances; all pairs of new ones share the pose error."""
@@ -231,10 +235,10 @@ class IdealEkf(EkfSlam):
         true = self._truth.landmarks[self.blocks.ids[columns // 2]]
         return observation.vehicle_from_world_with_jacobians(self._true_pose, true)
 
-    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
         state = self.blocks.state
         seen = expected(state, columns, z, cov_z, self._jacobians(columns))
-        correct_in_place(state, seen)
+        correct_in_place(state, seen, gate)
         return Innovation(seen.innovation, seen.S)
 
     def _placement(self, ids: IntArray, z: Array) -> PlacementJacobians:

@@ -69,14 +69,16 @@ class SlamFilter(ABC):
         """Innovation of landmarks of the map; the estimate stays."""
 
     @abstractmethod
-    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
-        """Use measurements of landmarks of the map."""
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        """Use measurements of landmarks of the map, in the runs whose innovation passes the gate."""
 
     @abstractmethod
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """Add landmarks to the map."""
 
-    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
+    def update(
+        self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike, gate: float = np.inf
+    ) -> Innovation | None:
         """Update with landmarks already in the map, then add those seen for the first time.
 
         Parameters
@@ -87,11 +89,14 @@ class SlamFilter(ABC):
             Relative Cartesian measurements, metres, vehicle frame.
         cov_z : array_like, shape (2, 2) or (m, 2, 2)
             Their covariance, m^2.
+        gate : float
+            Where the normalised innovation squared of the known landmarks together is larger, that run
+            does not use them.
 
         Returns
         -------
         Innovation or None
-            None when no landmark was known before.
+            Of the known landmarks, used or not.  None when no landmark was known before.
 
         Raises
         ------
@@ -102,14 +107,18 @@ class SlamFilter(ABC):
         columns = self._columns(ids)
         known = columns >= 0
         if len(ids) and known.all():  # the common case, without copies
-            return self._update_known(columns, z, cov_z)
-        seen = self._update_known(columns[known], z[:, known], cov_z[known]) if known.any() else None
+            return self._update_known(columns, z, cov_z, gate)
+        seen = None
+        if known.any():
+            seen = self._update_known(columns[known], z[:, known], cov_z[known], gate)
         if len(ids):
             self._augment(ids[~known], z[:, ~known], cov_z[~known])
         return seen
 
     def innovation(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
-        """Innovation and S that :meth:`update` would return, for a gate to look at; no estimate changes.
+        """Innovation and S that :meth:`update` would return; no estimate changes.
+
+        For an association, or a gate that needs more than one number (:meth:`update` has one of its own).
 
         Parameters, errors and result as for :meth:`update`; landmarks that are not in the map are left out.
         """

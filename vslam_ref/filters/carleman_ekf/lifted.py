@@ -162,11 +162,12 @@ class LiftedCarlemanEkf(SlamFilter):
     def _innovation(self, slots: IntArray, z: Array, cov_z: Array) -> Innovation:
         return self._expected(slots, z, cov_z)[0]
 
-    def _update_known(self, slots: IntArray, z: Array, cov_z: Array) -> Innovation:
+    def _update_known(self, slots: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
         """Kalman update of all lifted states. Implements :eq:`eq-gain`."""
         seen, HP = self._expected(slots, z, cov_z)
         root = np.linalg.cholesky(seen.S)
         G, y = np.linalg.solve(root, HP), np.linalg.solve(root, seen.innovation[:, :, None])
+        G[np.sum(y[:, :, 0] ** 2, 1) > gate] = 0.0
         self._z[:, : self.size] += (transpose(G) @ y)[:, :, 0]  # eq-gain
         self._P[:, : self.size, : self.size] -= transpose(G) @ G
         return seen

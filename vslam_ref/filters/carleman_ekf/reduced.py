@@ -152,9 +152,10 @@ class ReducedCarlemanEkf(SlamFilter):
         seen = reduced_expected(self._applied().state, self._frame, columns, z, cov_z)
         return Innovation(seen.innovation, seen.S)
 
-    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
         b, self._noisy = self.blocks, False
-        return Innovation(*reduced_update_in_place(b.state, b.b, self._P_a, self._frame, columns, z, cov_z))
+        noise = b.b, self._P_a, self._frame
+        return Innovation(*reduced_update_in_place(b.state, *noise, columns, z, cov_z, gate))
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """r_new = z, uncorrelated with everything; its world place p + h z, when carried, is not."""

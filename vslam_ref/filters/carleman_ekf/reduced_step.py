@@ -154,7 +154,14 @@ def reduced_apply_in_place(state: State, b: int, P_a: Array, frame: Complex) -> 
 
 @accelerated("reduced:reduced_update_in_place")
 def reduced_update_in_place(
-    state: State, b: int, P_a: Array, frame: Complex, columns: IntArray, z: Array, cov_z: Array
+    state: State,
+    b: int,
+    P_a: Array,
+    frame: Complex,
+    columns: IntArray,
+    z: Array,
+    cov_z: Array,
+    gate: float,
 ) -> tuple[Array, Array]:
     """:func:`reduced_apply_in_place`, then use z = c rho - tau + noise of m landmarks.
 
@@ -172,6 +179,8 @@ def reduced_update_in_place(
         Relative Cartesian measurements, metres, vehicle frame.
     cov_z : ndarray, shape (m, 2, 2)
         Their covariances, m^2.
+    gate : float
+        Runs whose normalised innovation squared is larger do not use the measurement.
 
     Returns
     -------
@@ -180,7 +189,7 @@ def reduced_update_in_place(
     """
     _apply(state, b, P_a, frame)
     seen = reduced_expected(state, frame, columns, z, cov_z)
-    kalman_update_in_place(state._replace(P_pp=P_a[:, :4, :4]), seen)
+    kalman_update_in_place(state._replace(P_pp=P_a[:, :4, :4]), seen, gate)
     return seen.innovation, seen.S
 
 

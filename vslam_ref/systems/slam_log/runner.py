@@ -215,15 +215,11 @@ class _Runner:
 
     def see(self, time: float, identity: int, polar: Array, z: Array, cov_z: Array) -> None:
         """Use a sighting if the gate lets its innovation pass; a new landmark has none."""
-        sighting = [identity], z[None, None], cov_z
-        asked = self.filter.innovation(*sighting)
-        passed = True
-        if asked is not None:
-            y, S = asked.innovation[0], asked.S[0]
+        found = self.filter.update([identity], z[None, None], cov_z, self.gate)
+        if found is not None:
+            y, S = found.innovation[0], found.S[0]
             passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
             self._seen.append((time, identity, polar, y, S, passed))
-        if passed:
-            self.filter.update(*sighting)
 
     def seen(self) -> Seen:
         """Everything seen, as arrays."""
