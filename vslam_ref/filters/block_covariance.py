@@ -234,12 +234,33 @@ def expected_landmarks(
 
 
 def map_columns(columns: IntArray) -> IntArray:
-    """Columns (2 m,) of both coordinates of the landmarks that start at ``columns`` (m,)."""
+    """Columns of both coordinates of landmarks.
+
+    Parameters
+    ----------
+    columns : ndarray of int, shape (m,)
+        First map column of each.
+
+    Returns
+    -------
+    ndarray of int, shape (2 m,)
+    """
     return (columns[:, None] + np.arange(2)).ravel()
 
 
 def diagonal_blocks(A: Array, b: int = 2) -> Array:
-    """View (B, m, b, b) of the b x b blocks on the diagonal of A (B, b m, b m)."""
+    """Square blocks on the diagonal, as a view where A lies in one piece.
+
+    Parameters
+    ----------
+    A : ndarray, shape (B, b m, b m)
+    b : int
+        Rows of a block.
+
+    Returns
+    -------
+    ndarray, shape (B, m, b, b)
+    """
     m = A.shape[1] // b
     blocks: Array = np.einsum("bkikj->bkij", A.reshape(len(A), m, b, m, b))
     return blocks

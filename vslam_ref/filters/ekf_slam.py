@@ -60,9 +60,20 @@ def ekf_predict_in_place(state: State, increment: vehicle.Increment) -> None:
 
 
 def move_covariance_in_place(state: State, F: Array, G: Array, Q: Array) -> None:
-    """Move the covariance by F (B, 3, 3), and add the noise Q (B, 2, 2) through G (B, 3, 2).
+    """Move the covariance of pose and cross terms, and add the noise of the increment.
 
     Implements :eq:`eq-predict`.
+
+    Parameters
+    ----------
+    state : State
+        ``P_pp`` and ``P_pm`` are changed in place.
+    F : ndarray, shape (B, 3, 3) or (3, 3)
+        Jacobian of the motion in the pose.
+    G : ndarray, shape (B, 3, 2) or (3, 2)
+        Jacobian in (ds, dalpha).
+    Q : ndarray, shape (B, 2, 2)
+        Covariance of (ds, dalpha), m^2, m rad, rad^2.
     """
     state.P_pp[...] = F @ state.P_pp @ F.swapaxes(-1, -2) + G @ Q @ G.swapaxes(-1, -2)  # eq-predict
     state.P_pm[...] = F @ state.P_pm

@@ -75,7 +75,21 @@ class Nullity(NamedTuple):
 
 
 def observability_matrix(run: LinearisedRun) -> Array:
-    """Local observability matrix (rows, D): every H_k times the product of the F before it."""
+    """Local observability matrix: every H_k times the product of the F before it.
+
+    Parameters
+    ----------
+    run : LinearisedRun
+
+    Returns
+    -------
+    ndarray, shape (rows, D)
+
+    Raises
+    ------
+    ValueError
+        If there are not as many transitions as sightings, or none.
+    """
     if len(run.transitions) != len(run.measurements) or not run.transitions:
         given = f"{len(run.transitions)} transitions and {len(run.measurements)} sightings"
         raise ValueError(f"{given}: need as many, and at least one")
@@ -130,7 +144,21 @@ def _sighting(pose: Array, ids: IntArray, places: Array, landmarks: int) -> Arra
 def linearise_truth(
     T_world_vehicle: ArrayLike, landmarks: ArrayLike, sightings: Sequence[ArrayLike]
 ) -> LinearisedRun:
-    """Jacobians at true poses (T + 1, 3) and landmarks (n, 2); ``sightings[k]``: ids seen from pose k + 1."""
+    """Jacobians of a run at the truth.
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (T + 1, 3)
+        True poses (x, y, theta), metres and radians.
+    landmarks : array_like, shape (n, 2)
+        World frame, metres.
+    sightings : sequence of array_like of int
+        ``sightings[k]``: the landmarks seen from pose k + 1.
+
+    Returns
+    -------
+    LinearisedRun
+    """
     poses, landmarks = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     F, H = [], []
     for k, seen in enumerate(sightings):
@@ -183,9 +211,20 @@ def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "firs
 
 
 def lift_tangent(T_world_vehicle: ArrayLike, landmarks: ArrayLike) -> Array:
-    """Derivative (11 + 6 n, 3 + 2 n) of the lift in pose (3,) and landmarks (n, 2): B14 and B15.
+    """Derivative of the lift in pose and landmarks: B14 and B15.
 
     Its columns span the tangent space of the manifold on which lifted states of real vehicles lie.
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (3,)
+        Pose (x, y, theta), metres and radians.
+    landmarks : array_like, shape (n, 2)
+        World frame, metres.
+
+    Returns
+    -------
+    ndarray, shape (11 + 6 n, 3 + 2 n)
     """
     pose, places = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     n, s, c = len(places), np.sin(pose[2]), np.cos(pose[2])

@@ -115,9 +115,22 @@ def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, 
 
 
 def differential_increment(control: ArrayLike, cov_u: ArrayLike, dt: float) -> Increment:
-    """Increment of a differential drive: control (B, 2) = speed v (m/s) and turn rate omega (rad/s).
+    """Increment of a differential drive: ds = v dt and dalpha = omega dt.
 
-    ds = v dt and dalpha = omega dt, linear in the control: the covariance is dt^2 cov_u exactly.
+    Linear in the control, so that the covariance is dt^2 cov_u exactly.
+
+    Parameters
+    ----------
+    control : array_like, shape (B, 2)
+        Speed v (m/s) and turn rate omega (rad/s).
+    cov_u : array_like, shape (2, 2) or (B, 2, 2)
+        Covariance of the control noise, (m/s)^2 and (rad/s)^2.
+    dt : float
+        Duration, seconds.
+
+    Returns
+    -------
+    Increment
     """
     u = np.asarray(control, dtype=np.float64)
     cov = np.broadcast_to(np.asarray(cov_u, dtype=np.float64) * dt**2, (*u.shape[:-1], 2, 2))

@@ -111,7 +111,20 @@ def _gaussian_moments(
 
 
 def lifted_start(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
-    """Mean (B, 11) and covariance (B, 11, 11) of the lifted start pose N(mean (B, 3), cov (B, 3, 3))."""
+    """Mean and covariance of the lifted start pose.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (B, 3)
+        Start pose (x, y, theta), world frame, metres and radians.
+    cov : ndarray, shape (B, 3, 3)
+        Its covariance.
+    kind : {"first_order", "gaussian"}
+
+    Returns
+    -------
+    mean, cov : ndarray, shapes (B, 11), (B, 11, 11)
+    """
     if checked_moments("start", kind) == "gaussian":
         return _gaussian_moments(_LIFTED_VEHICLE, mean, cov)
     J = lift.lift_vehicle_jacobian(mean)
@@ -126,7 +139,18 @@ class ControlMoments(NamedTuple):
 
 
 def control_monomials(U: Array) -> Array:
-    """The nine monomials w (..., 9) of U = (u1, u2, u3) (..., 3)."""
+    """Monomials of a control.
+
+    Parameters
+    ----------
+    U : ndarray, shape (..., 3)
+        u1 = ds (m), u2 = sin(dalpha), u3 = cos(dalpha).
+
+    Returns
+    -------
+    ndarray, shape (..., 9)
+        In the order of :data:`.lift.MONOMIALS`.
+    """
     u1, u2, u3 = U[..., 0], U[..., 1], U[..., 2]
     return np.stack([np.ones_like(u1), u1, u2, u3, u2 * u2, u2 * u3, u3 * u3, u1 * u2, u1 * u3], -1)
 

@@ -118,12 +118,35 @@ def fraction_above(curves: ArrayLike, line: float, window: ArrayLike | None = No
 
 
 def time_maximum(curves: ArrayLike, window: ArrayLike | None = None) -> Array:
-    """Largest value of each curve (..., T) in the window; NaN where the curve has a NaN."""
+    """Largest value of each curve in the window.
+
+    Parameters
+    ----------
+    curves : array_like, shape (..., T)
+    window : array_like of bool, shape (T,), optional
+        Which time points count; all by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        NaN where the curve has a NaN.
+    """
     return np.asarray(np.max(_windowed(curves, window), axis=-1), dtype=np.float64)
 
 
 def window_mean(curves: ArrayLike, window: ArrayLike | None = None) -> Array:
-    """Average over time of each curve (..., T) in the window."""
+    """Average over time of each curve in the window.
+
+    Parameters
+    ----------
+    curves : array_like, shape (..., T)
+    window : array_like of bool, shape (T,), optional
+        Which time points count; all by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
     return np.asarray(np.mean(_windowed(curves, window), axis=-1), dtype=np.float64)
 
 

@@ -69,7 +69,21 @@ class Placed(NamedTuple):
 
 
 def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Where there is truth (N,), and the true poses there (n, 3), interpolated linearly in time."""
+    """Interpolate the truth linearly in time.
+
+    Parameters
+    ----------
+    truth : Truth
+    times : ndarray, shape (N,)
+        Seconds.
+
+    Returns
+    -------
+    ok : ndarray of bool, shape (N,)
+        Where there is truth.
+    poses : ndarray, shape (n, 3)
+        True T_world_vehicle there, metres and radians.
+    """
     after = np.clip(np.searchsorted(truth.times, times), 1, len(truth.times) - 1)
     t0, t1 = truth.times[after - 1], truth.times[after]
     ok = (times >= t0) & (times <= t1) & (t1 - t0 <= truth.max_gap)
@@ -104,7 +118,21 @@ def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
 
 
 def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Array]:
-    """Poses (N, 3) and covariances (N, 3, 3) of the point at ``lever`` (2,) in the vehicle frame."""
+    """Poses and covariances of another point of the vehicle.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (N, 3)
+        (x, y, theta), metres and radians, any frame.
+    covs : ndarray, shape (N, 3, 3)
+    lever : ndarray, shape (2,)
+        The point, vehicle frame, metres.
+
+    Returns
+    -------
+    poses, covs : ndarray, shapes (N, 3), (N, 3, 3)
+        In the same frame.
+    """
     arm = so2.rotate(poses[:, 2], np.broadcast_to(lever, (len(poses), 2)))
     J = np.tile(np.eye(3), (len(poses), 1, 1))
     J[:, 0, 2], J[:, 1, 2] = -arm[:, 1], arm[:, 0]
@@ -137,7 +165,20 @@ def errors_while_blind(run: LogRun, truth: Truth, after: float = 5.0) -> dict[st
 
 
 def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:
-    """Truth minus estimate (m, 2) of the landmarks that are in both maps, world frame, metres."""
+    """Errors of the landmarks that are in both maps: truth minus estimate.
+
+    Parameters
+    ----------
+    run : LogRun
+    truth : Truth
+    T_world_run : ndarray, shape (3,)
+        Motion that puts the run into the world.
+
+    Returns
+    -------
+    ndarray, shape (m, 2)
+        World frame, metres.
+    """
     true = dict(zip(truth.ids.tolist(), truth.landmarks, strict=True))
     pairs = [(m, true[i]) for i, m in zip(run.map.ids.tolist(), run.map.mean[0], strict=True) if i in true]
     if not pairs:

@@ -144,7 +144,18 @@ class LogRun(NamedTuple):
 
 
 def record_times(log: SlamLog, settings: RunSettings) -> Array:
-    """Times of the records: the log's start, then every ``record_period``."""
+    """Times of the records: the log's start, then every ``record_period``.
+
+    Parameters
+    ----------
+    log : SlamLog
+    settings : RunSettings
+
+    Returns
+    -------
+    ndarray, shape (R,)
+        Seconds.
+    """
     count = int((log.times[-1] - log.times[0]) / settings.record_period + 1e-9)
     return np.asarray(log.times[0] + settings.record_period * np.arange(count + 1))
 
