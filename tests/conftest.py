@@ -12,7 +12,10 @@ Property tests draw the same examples in every run.  ``make test-random`` draws 
 
 from __future__ import annotations
 
+import ast
 import importlib.util
+import inspect
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -53,3 +56,46 @@ def answer(request: pytest.FixtureRequest) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+class _SignFlip(ast.NodeTransformer):
+    """Change the sign of one sum, difference or negative number: the one with this number."""
+
+    def __init__(self, number: int) -> None:
+        self.left, self.line = number, 0
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        node = super().generic_visit(node)
+        sums = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)
+        negative = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
+        if not (sums or negative):
+            return node
+        self.left -= 1
+        if self.left != -1:
+            return node
+        self.line = node.lineno
+        if isinstance(node, ast.UnaryOp):
+            return node.operand
+        node.op = ast.Sub() if isinstance(node.op, ast.Add) else ast.Add()
+        return node
+
+
+def sign_flips(module: ModuleType) -> Iterator[tuple[str, ModuleType]]:
+    """The module once for every sign in its functions, that sign changed: (the line, the module)."""
+    source = inspect.getsource(module)
+    number = 0
+    while True:
+        flip = _SignFlip(number)
+        tree = flip.visit(ast.parse(source))
+        if not flip.line:
+            return
+        number += 1
+        line = source.splitlines()[flip.line - 1].strip()
+        twin = ModuleType(module.__name__)
+        exec(compile(ast.fix_missing_locations(tree), f"{module.__name__} with a flip", "exec"), vars(twin))
+        yield line, twin
+
+
+@pytest.fixture(scope="session")
+def flips() -> Callable[[ModuleType], Iterator[tuple[str, ModuleType]]]:
+    return sign_flips

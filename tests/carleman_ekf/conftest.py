@@ -237,7 +237,7 @@ def field() -> Callable[..., Field]:
             s.step: (s.ids, s.z + config.sigma_z * e)
             for s, e in zip(world.sightings, noise.sightings, strict=True)
         }
-        truth = se2.compose([0.0, 0.0, turn], world.poses)
+        truth = se2.compose([0.0, 0.0, turn], world.T_world_vehicle)
         start = np.concatenate([so2.rotate(turn, noise.start[:, :2]), noise.start[:, 2:]], 1)
         return Field(truth, steps, seen, config.cov_z, start)
 

@@ -165,8 +165,9 @@ def jitter_lifted(slam: LiftedCarlemanEkf) -> None:
 
 
 def jitter_reduced(slam: ReducedCarlemanEkf) -> None:
-    slam.blocks.P_pp += 1e-6 * np.eye(4)
-    slam.blocks.P_mm += 1e-6 * np.eye(slam.blocks.P_mm.shape[1])
+    state = slam.blocks.state
+    state.P_pp[:] += 1e-6 * np.eye(4)
+    state.P_mm[:] += 1e-6 * np.eye(state.P_mm.shape[1])
 
 
 def nothing(slam: Any) -> None:

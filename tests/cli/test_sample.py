@@ -18,7 +18,7 @@ from vslam_ref.estimation.bundle import bundle_adjust
 from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.grids.log_odds import OCCUPIED
 from vslam_ref.systems.slam_log.timeline import control_increments
-from vslam_ref.worlds.bundle_scene import nearest_of_family
+from vslam_ref.worlds.bundles import nearest_of_family
 from vslam_ref.worlds.floor_plan.crowd import nearest_on_segments
 from vslam_ref.worlds.floor_plan.robot import drive
 

@@ -25,7 +25,7 @@ def test_the_truth_is_read_apart_on_the_time_of_the_log(mrclam_folder: Path) -> 
     log = mrclam.read_log(mrclam_folder, 1)
     truth = mrclam.read_truth(mrclam_folder, 1, log)
     np.testing.assert_allclose(truth.times, [-1.0, -0.9, 1.6])
-    np.testing.assert_allclose(truth.poses[:, 2], [3.1, 3.2 - 2 * np.pi, 3.3 - 2 * np.pi])
+    np.testing.assert_allclose(truth.T_world_vehicle[:, 2], [3.1, 3.2 - 2 * np.pi, 3.3 - 2 * np.pi])
     assert truth.ids.tolist() == [6, 7, 8]
     assert truth.exact
 

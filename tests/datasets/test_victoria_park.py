@@ -146,7 +146,7 @@ def test_the_gps_rule_keeps_most_fixes_and_only_positions() -> None:
     folder = catalogue.require("victoria_park")
     truth = park.read_truth(folder, park.read_log(folder))
     assert 3000 < len(truth.times) < 4466
-    assert np.isnan(truth.poses[:, 2]).all()
+    assert np.isnan(truth.T_world_vehicle[:, 2]).all()
     assert not truth.exact
     assert truth.lever.tolist() == [park.ANTENNA_AHEAD, 0.0]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.geometry import se2
 
@@ -76,7 +76,7 @@ def test_ideal_ekf_without_noise_is_the_ekf(new_drive: Any) -> None:
     """When every measurement and increment is exact, estimate and truth are the same place."""
     drive = new_drive(steps=60)
     exact, plain = [], EkfSlam(drive.truth[0], drive.cov)
-    ideal = EkfSlam(drive.truth[0], drive.cov, truth=Truth(drive.truth, drive.landmarks))
+    ideal = IdealEkf(drive.truth[0], drive.cov, Truth(drive.truth, drive.landmarks))
     for k, step in enumerate(drive.steps):
         inc = Increment(np.array([0.3]), np.array([0.05]), step.increment.cov)
         x = drive.truth[k + 1]
@@ -92,7 +92,7 @@ def test_ideal_ekf_without_noise_is_the_ekf(new_drive: Any) -> None:
 def test_ideal_ekf_takes_its_covariance_from_the_truth_alone(new_drive: Any) -> None:
     """Two runs with other noises have the same covariance, to the last bit; a plain EKF's differ."""
     drive = new_drive(batch=2, steps=60)
-    ideal = EkfSlam(drive.mean, drive.cov, truth=Truth(drive.truth, drive.landmarks))
+    ideal = IdealEkf(drive.mean, drive.cov, Truth(drive.truth, drive.landmarks))
     plain = EkfSlam(drive.mean, drive.cov)
     for slam in (ideal, plain):
         drive.feed(slam)
@@ -105,8 +105,8 @@ def test_ideal_ekf_without_unobservable_gain(new_drive: Any) -> None:
     drive = new_drive(steps=200)
     no_noise = np.zeros((1, 2, 2))
     headings = {}
-    for name, truth in (("ideal", Truth(drive.truth, drive.landmarks)), ("plain", None)):
-        slam = EkfSlam(drive.mean, drive.cov, truth=truth)
+    ideal = IdealEkf(drive.mean, drive.cov, Truth(drive.truth, drive.landmarks))
+    for name, slam in (("ideal", ideal), ("plain", EkfSlam(drive.mean, drive.cov))):
         for step in drive.steps:
             slam.predict(Increment(step.increment.ds, step.increment.dalpha, no_noise))
             if len(step.ids):

@@ -162,7 +162,8 @@ def filter_with_landmarks(rng: np.random.Generator) -> Blocks:
     A = rng.standard_normal((7, 7))
     P, x = A @ A.T / 50 + 1e-3 * np.eye(7), rng.standard_normal(7)
     b = Blocks(x[None, :3], P[None, :3, :3], landmark_states=2, capacity=2)
-    b.append(np.array([4, 9]), x[None, 3:], P[None, 3:, 3:], P[None, :3, 3:], np.zeros((1, 0, 4)))
+    b.append(np.array([4, 9]), x[None, 3:], np.zeros((1, 4, 3)), np.zeros((1, 2, 2, 2)))
+    b.P_pm[:], b.P_mm[:] = P[:3, 3:], P[3:, 3:]
     return b
 
 

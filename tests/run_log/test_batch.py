@@ -119,7 +119,7 @@ def test_batch_poses_stand_at_the_sightings(
     at = np.isin(run.times.round(6), batch.times.round(6))
     there = np.isin(batch.times.round(6), run.times.round(6))
     assert at.sum() > 50
-    np.testing.assert_allclose(run.poses[at][:, :2], batch.poses[there][:, :2], atol=1e-9)
+    np.testing.assert_allclose(run.T_run_vehicle[at][:, :2], batch.poses[there][:, :2], atol=1e-9)
 
 
 def test_gains_and_offsets_are_found_without_truth(

@@ -110,7 +110,7 @@ def test_a_rejected_sighting_leaves_the_filter_as_it_was(
         )
     )
     a, b = (run_log(x, calibration, "ekf", CERTAIN) for x in (changed, without))
-    np.testing.assert_array_equal(a.poses, b.poses)
+    np.testing.assert_array_equal(a.T_run_vehicle, b.T_run_vehicle)
     np.testing.assert_array_equal(a.covs, b.covs)
 
 
@@ -166,7 +166,7 @@ def test_longer_steps_change_the_trajectory_by_little(
     log = mrclam.read_log(world.folder, 1)
     fine = run_log(log, calibration, "ekf", CERTAIN)
     coarse = run_log(log, calibration, "ekf", replace(CERTAIN, max_step=0.1))
-    assert np.abs(fine.poses - coarse.poses).max() < 0.02
+    assert np.abs(fine.T_run_vehicle - coarse.T_run_vehicle).max() < 0.02
 
 
 def test_a_sighting_is_used_when_it_was_taken(
@@ -191,13 +191,13 @@ def test_truth_of_an_antenna_ahead_is_compared_with_the_antenna(
     log = mrclam.read_log(world.folder, 1)
     truth = mrclam.read_truth(world.folder, 1, log)
     lever = np.array([2.0, 0.5])
-    c, s = np.cos(truth.poses[:, 2]), np.sin(truth.poses[:, 2])
-    ahead = truth.poses.copy()
+    c, s = np.cos(truth.T_world_vehicle[:, 2]), np.sin(truth.T_world_vehicle[:, 2])
+    ahead = truth.T_world_vehicle.copy()
     ahead[:, 0] += c * lever[0] - s * lever[1]
     ahead[:, 1] += s * lever[0] + c * lever[1]
     run = run_log(log, calibration, "ekf", CERTAIN)
-    levered = summary(run, truth._replace(poses=ahead, lever=lever))
-    plain = summary(run, truth._replace(poses=ahead))
+    levered = summary(run, truth._replace(T_world_vehicle=ahead, lever=lever))
+    plain = summary(run, truth._replace(T_world_vehicle=ahead))
     assert levered["rmse_position_m"] < 3e-3
     assert levered["rmse_position_unaligned_m"] < 5e-3
     assert plain["rmse_position_m"] > 0.5
@@ -231,4 +231,4 @@ def test_the_filter_class_may_be_given(make_world: Callable[..., object], calibr
     world = make_world("w", None, seconds=20.0)
     log = mrclam.read_log(world.folder, 1)
     by_name, by_class = run_log(log, calibration, "ekf"), run_log(log, calibration, EkfSlam)
-    np.testing.assert_array_equal(by_name.poses, by_class.poses)
+    np.testing.assert_array_equal(by_name.T_run_vehicle, by_class.T_run_vehicle)

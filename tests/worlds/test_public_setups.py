@@ -31,8 +31,10 @@ def test_the_circle_is_a_regular_polygon(ring: circle.Circle) -> None:
     turn = np.exp(1j * np.deg2rad(1.5))
     k = np.arange(2500)
     places = 0.25 * (turn**k - 1) / (turn - 1)
-    assert np.abs(ring.poses[:, 0] + 1j * ring.poses[:, 1] - places).max() < 2500 * EPS * 20
-    assert np.abs(ring.poses[240, :2]).max() < 240 * EPS * 20
+    assert (
+        np.abs(ring.T_world_vehicle[:, 0] + 1j * ring.T_world_vehicle[:, 1] - places).max() < 2500 * EPS * 20
+    )
+    assert np.abs(ring.T_world_vehicle[240, :2]).max() < 240 * EPS * 20
     assert len(ring.times) == 2500
 
 
@@ -59,8 +61,8 @@ def test_sightings_are_exact_and_complete(name: str, request: pytest.FixtureRequ
     places = world.landmarks @ np.array([1, 1j])
     by_step = {s.step: s for s in world.sightings}
     every = 1 if name == "ring" else 8
-    for step in range(every, len(world.poses), every * 50):
-        x, y, theta = world.poses[step]
+    for step in range(every, len(world.T_world_vehicle), every * 50):
+        x, y, theta = world.T_world_vehicle[step]
         z = (places - (x + 1j * y)) * np.exp(-1j * theta)
         if step not in by_step:
             assert name == "road"
@@ -80,20 +82,23 @@ def test_sightings_are_exact_and_complete(name: str, request: pytest.FixtureRequ
 def test_the_course_passes_its_waypoints_within_the_limits(road: waypoint_course.WaypointCourse) -> None:
     c = road.config
     for point in np.array(c.waypoints).reshape(-1, 2):
-        away = np.hypot(*(road.poses[:, :2] - point).T)
+        away = np.hypot(*(road.T_world_vehicle[:, :2] - point).T)
         assert away.min() <= c.near
     steer = road.controls[:, 1]
     assert np.abs(steer).max() <= np.deg2rad(30) + EPS
     assert np.abs(np.diff(steer)).max() <= np.deg2rad(20) * 0.025 * (1 + 1e-9)
-    assert 360 < np.hypot(*np.diff(road.poses[:, :2], axis=0).T).sum() / 2 < 400
+    assert 360 < np.hypot(*np.diff(road.T_world_vehicle[:, :2], axis=0).T).sum() / 2 < 400
 
 
 def test_the_course_obeys_the_front_wheel_written_out(road: waypoint_course.WaypointCourse) -> None:
-    (x, y, theta), (V, G) = road.poses[:-1].T, road.controls.T
+    (x, y, theta), (V, G) = road.T_world_vehicle[:-1].T, road.controls.T
     moved = x + 1j * y + 0.025 * V * np.cos(G) * np.exp(1j * theta)
-    assert np.abs(moved - (road.poses[1:, 0] + 1j * road.poses[1:, 1])).max() < 16 * EPS * 100
+    assert (
+        np.abs(moved - (road.T_world_vehicle[1:, 0] + 1j * road.T_world_vehicle[1:, 1])).max()
+        < 16 * EPS * 100
+    )
     turned = np.exp(1j * (theta + 0.025 * V * np.sin(G) / 4.0))
-    assert np.abs(turned - np.exp(1j * road.poses[1:, 2])).max() < 16 * EPS
+    assert np.abs(turned - np.exp(1j * road.T_world_vehicle[1:, 2])).max() < 16 * EPS
 
 
 def test_rear_axle_and_front_wheel_move_alike() -> None:

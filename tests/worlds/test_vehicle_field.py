@@ -26,8 +26,8 @@ def test_standard_course_is_the_papers_square(world: vf.VehicleField) -> None:
     assert CONFIG.steps == 1600
     assert world.times[-1] == pytest.approx(160.0, abs=1e-9)
     for axis in range(2):
-        assert np.ptp(world.poses[:, axis]) == pytest.approx(20.0, abs=1e-9)
-        assert world.poses[:, axis].max() == pytest.approx(10.0, abs=1e-9)
+        assert np.ptp(world.T_world_vehicle[:, axis]) == pytest.approx(20.0, abs=1e-9)
+        assert world.T_world_vehicle[:, axis].max() == pytest.approx(10.0, abs=1e-9)
     # a square of 80 m with its corners cut by radius 2.5: 80 - (8 - 2 pi) 2.5 = 75.7 m in 80 s
     assert world.controls[0, 0] == pytest.approx((80 - (8 - 2 * np.pi) * 2.5) / 80, rel=0.01)
 
@@ -77,7 +77,7 @@ def test_each_sighting_is_exact_and_complete(world: vf.VehicleField) -> None:
     by_step = {s.step: s for s in world.sightings}
     places = world.landmarks @ np.array([1, 1j])
     for step in range(0, CONFIG.steps + 1, 10):
-        x, y, theta = world.poses[step]
+        x, y, theta = world.T_world_vehicle[step]
         r = (places - (x + 1j * y)) * np.exp(-1j * theta)
         near = np.flatnonzero(np.abs(r) <= CONFIG.max_range)
         if not len(near):
@@ -132,7 +132,7 @@ def test_draws_are_standard_normal_and_of_the_stated_shapes(world: vf.VehicleFie
 def test_same_seed_same_world() -> None:
     a, b = (vf.make_field(CONFIG, np.random.default_rng(3)) for _ in range(2))
     assert np.array_equal(a.landmarks, b.landmarks)
-    assert np.array_equal(a.poses, b.poses)
+    assert np.array_equal(a.T_world_vehicle, b.T_world_vehicle)
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,12 @@ in_one_piece: Any = intrinsic(_as_contiguous)
 """Look at a row as at a contiguous array, which :func:`check_rows` found it to be."""
 
 
+def room_for_innovation(z):
+    """Empty arrays (B, 2 m), (B, 2 m, 2 m) for the innovation of measurements z (B, m, 2) and its S."""
+    B, m, _ = z.shape
+    return np.empty((B, 2 * m)), np.empty((B, 2 * m, 2 * m))
+
+
 @njit(cache=True)
 def check_rows(x_m, P_pm, P_mm):
     """Raise unless the last axis is contiguous, as it is in any view of whole rows or their beginnings."""
@@ -85,6 +91,16 @@ def whiten(S, L, W):
         for c in range(W.shape[1]):
             even[c] *= a
             odd[c] = e * (odd[c] - b * even[c])
+
+
+@njit(cache=True)
+def apply_gate(gate, W):
+    """Nothing of the whitened W is left where its last column, L^-1 innovation, is longer than the gate."""
+    squared, last = 0.0, W.shape[1] - 1
+    for i in range(W.shape[0]):
+        squared += W[i, last] * W[i, last]
+    if squared > gate:
+        W[:] = 0.0
 
 
 @njit(cache=True)

@@ -72,11 +72,6 @@ def changed(ndim, dtype=types.float64):
     return types.Array(dtype, ndim, "A")
 
 
-def made(ndim):
-    """Type of an array that is returned."""
-    return types.Array(types.float64, ndim, "C")
-
-
 def kernel(*arguments, returns=types.void):
     """Declare a kernel with one signature, to be compiled by :func:`compiled`."""
 
@@ -88,9 +83,20 @@ def kernel(*arguments, returns=types.void):
     return declare
 
 
-def compiled(dispatcher):
-    """Compile a kernel for its signature, or read it from the cache, and for no other."""
+def unpacks(dispatcher):
+    """Declare a Python function that unpacks NamedTuples for a kernel; both are compiled together."""
+
+    def declare(function):
+        function.kernel = dispatcher
+        return function
+
+    return declare
+
+
+def compiled(function):
+    """Compile a kernel, or the one behind :func:`unpacks`, for its signature, and for no other."""
+    dispatcher = getattr(function, "kernel", function)
     if not dispatcher.signatures:
         dispatcher.compile(dispatcher.signature)
         dispatcher.disable_compile()
-    return dispatcher
+    return function

@@ -7,15 +7,17 @@ from numba import types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    apply_gate,
     check_rows,
     gain,
     in_one_piece,
     load_landmarks,
     load_tile,
+    room_for_innovation,
     shrink_rows,
     whiten,
 )
-from vslam_ref._kernels._signature import changed, given, kernel, njit
+from vslam_ref._kernels._signature import changed, given, kernel, njit, unpacks
 
 
 @njit(cache=True)
@@ -49,9 +51,10 @@ def _add_control_noise(G, cov, N):
             v = 0.0
             for t in range(r):
                 v += G[i, t] * cov[t, q]
-            if v != 0.0:
-                for j in range(i + 1):
-                    N[i, j] += v * G[j, q]
+            if v == 0.0:  # most of G is
+                continue
+            for j in range(i + 1):
+                N[i, j] += v * G[j, q]
 
 
 @njit(cache=True)
@@ -78,8 +81,11 @@ def _put(G, row, column, value):
 
 
 @kernel(changed(2), changed(3), changed(2, types.complex128), given(3), given(4))
-def reduced_predict(x_p, P_a, frame, control, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict`, control by control."""
+def reduced_predict_in_place(x_p, P_a, frame, control, cov):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_in_place`.
+
+    Control by control.
+    """
     G, N = np.zeros((8, 5)), np.zeros((8, 8))  # rows: x, y, sin, cos, Re A, Im A, Re g, Im g
     for b in range(x_p.shape[0]):
         h, D, e = complex(x_p[b, 3], x_p[b, 2]), complex(0.0, 0.0), complex(1.0, 0.0)
@@ -105,8 +111,8 @@ def reduced_predict(x_p, P_a, frame, control, cov):
 
 
 @kernel(changed(2), changed(3), changed(2, types.complex128), given(2), given(2), given(4))
-def reduced_predict_first_order(x_p, P_a, frame, ds, dalpha, cov):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_first_order`.
+def reduced_predict_first_order_in_place(x_p, P_a, frame, ds, dalpha, cov):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_predict_first_order_in_place`.
 
     Written out for noise in (ds, dalpha): with dm = -i m dalpha, A is -i dalpha and g is
     -dds / c_old + i tau_new dalpha / c_new.
@@ -183,6 +189,19 @@ def _add_noise(re, im, NE, even, odd):
 
 
 @njit(cache=True)
+def _add_noise_and_two(re, im, noise, tile, first, second, even, odd):
+    """:func:`_add_noise`, and minus four rows of W; ``first``, ``second`` are W in the columns of the two."""
+    f, g, s, t = noise[0], noise[1], noise[2], noise[3]
+    u, v, w, x = tile[0], tile[1], tile[2], tile[3]
+    p, q, m, n = first[0], first[1], first[2], first[3]
+    for c in range(even.shape[0]):
+        even[c] += (re * f[c] - im * g[c] + s[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+    p, q, m, n = second[0], second[1], second[2], second[3]
+    for c in range(odd.shape[0]):
+        odd[c] += (im * f[c] + re * g[c] + t[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+
+
+@njit(cache=True)
 def _change_map(W, tile, E, NE, noise, b, P_mm):
     """P_mm += E^T N_gg E - W^T W; ``tile`` and ``noise`` are room for tiles of W and of NE.
 
@@ -193,21 +212,12 @@ def _change_map(W, tile, E, NE, noise, b, P_mm):
         hi = min(M, lo + TILE)
         load_tile(W, lo, tile)
         load_tile(NE, lo, noise)
-        f, g, s, t = noise[0], noise[1], noise[2], noise[3]
-        u, v, w, x = tile[0], tile[1], tile[2 % k], tile[3 % k]
         for r in range(0, M, 2):
             even, odd = in_one_piece(P_mm[r])[lo:hi], in_one_piece(P_mm[r + 1])[lo:hi]
             first, re, im = 0, E[0, r], E[0, r + 1]
             if r % b == 0 and k >= 4:
                 first = 4
-                p, q, m, n = W[0, r], W[1, r], W[2, r], W[3, r]
-                for c in range(even.shape[0]):
-                    noise_here = re * f[c] - im * g[c] + s[c]
-                    even[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
-                p, q, m, n = W[0, r + 1], W[1, r + 1], W[2, r + 1], W[3, r + 1]
-                for c in range(odd.shape[0]):
-                    noise_here = im * f[c] + re * g[c] + t[c]
-                    odd[c] += noise_here - p * u[c] - q * v[c] - m * w[c] - n * x[c]
+                _add_noise_and_two(re, im, noise, tile, W[:4, r], W[:4, r + 1], even, odd)
             elif r % b == 0:
                 _add_noise(re, im, noise, even, odd)
             shrink_rows(W, tile, first, r, even, odd)
@@ -225,8 +235,7 @@ _MAP = (given(2), changed(3), changed(3), types.int64, changed(3), changed(2, ty
 
 
 @kernel(*_MAP)
-def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_apply`."""
+def _apply_all(x_m, P_pm, P_mm, b, P_a, frame):
     check_rows(x_m, P_pm, P_mm)
     M = x_m.shape[1]
     E, NE = np.zeros((4, M)), np.empty((4, M))
@@ -237,6 +246,12 @@ def reduced_apply(x_m, P_pm, P_mm, b, P_a, frame):
             even, odd = in_one_piece(P_mm[run, r]), in_one_piece(P_mm[run, r + 1])
             _add_noise(E[0, r], E[0, r + 1], NE, even, odd)
         _forget(P_a[run], frame[run])
+
+
+@unpacks(_apply_all)
+def reduced_apply_in_place(state, b, P_a, frame):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_apply_in_place`."""
+    _apply_all(state.x_m, state.P_pm, state.P_mm, b, P_a, frame)
 
 
 @njit(cache=True)
@@ -256,10 +271,9 @@ def _turn_pairs(c, columns, W, S):
 
 @kernel(
     *(changed(2), changed(2), *_MAP[1:]),
-    *(given(1, types.int64), given(3), given(3), changed(2), changed(3)),
+    *(given(1, types.int64), given(3), given(3), types.float64, changed(2), changed(3)),
 )
-def reduced_update(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innovation, S):
-    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update`."""
+def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 5)), np.empty((k, min(M, TILE)))
@@ -276,12 +290,20 @@ def reduced_update(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, innov
             innovation[run, 2 * j] = z[run, j, 0] - predicted.real
             innovation[run, 2 * j + 1] = z[run, j, 1] - predicted.imag
         _turn_pairs(c, columns, W, S[run])
+        W[:, M + 4] = innovation[run]
         for j in range(columns.shape[0]):
-            for r in range(2):
-                W[2 * j + r, M + 4] = innovation[run, 2 * j + r]
-                for q in range(2):
-                    S[run, 2 * j + r, 2 * j + q] += cov_z[j, r, q]
+            S[run, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += cov_z[j]
         whiten(S[run], L, W)
+        apply_gate(gate, W)
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])
         _change_map(W, tile, E, NE, noise, b, P)
         _forget(P_a[run], frame[run])
+
+
+@unpacks(_update_all)
+def reduced_update_in_place(state, b, P_a, frame, columns, z, cov_z, gate):
+    """Twin of :func:`vslam_ref.filters.carleman_ekf.reduced_step.reduced_update_in_place`."""
+    innovation, S = room_for_innovation(z)
+    x_p, x_m, _, P_pm, P_mm = state
+    _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, innovation, S)
+    return innovation, S

@@ -7,14 +7,16 @@ from numba import types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    apply_gate,
     check_rows,
     gain,
     in_one_piece,
     load_landmarks,
+    room_for_innovation,
     shrink_map,
     whiten,
 )
-from vslam_ref._kernels._signature import changed, given, kernel, made, njit
+from vslam_ref._kernels._signature import changed, given, kernel, njit, unpacks
 
 
 @njit(cache=True)
@@ -27,72 +29,13 @@ def _wrap(a):
 
 
 @njit(cache=True)
-def _general_rows(P_pp, P_pm, P_mm, H_p, H_l, columns, W):
-    """H P for any H_p (m, 2, p) and H_l (m, 2, 2)."""
-    p, M = P_pm.shape
-    load_landmarks(P_pm, P_mm, columns, W)
-    for i in range(columns.shape[0]):
-        u, v = W[2 * i], W[2 * i + 1]
-        a, b, d, e = H_l[i, 0, 0], H_l[i, 0, 1], H_l[i, 1, 0], H_l[i, 1, 1]
-        for c in range(M + p):
-            s, t = u[c], v[c]
-            u[c], v[c] = a * s + b * t, d * s + e * t
-        for q in range(p):
-            a, d, row = H_p[i, 0, q], H_p[i, 1, q], in_one_piece(P_pm[q])
-            for c in range(M):
-                u[c] += a * row[c]
-                v[c] += d * row[c]
-            for r in range(p):
-                u[M + r] += a * P_pp[q, r]
-                v[M + r] += d * P_pp[q, r]
-
-
-@njit(cache=True)
-def _general_S(W, M, H_p, H_l, columns, cov_z, S):
-    """S = (H P) H^T + cov_z."""
-    for j in range(columns.shape[0]):
-        c = columns[j]
-        for a in range(S.shape[0]):
-            for s in range(2):
-                v = W[a, c] * H_l[j, s, 0] + W[a, c + 1] * H_l[j, s, 1]
-                for q in range(H_p.shape[2]):
-                    v += W[a, M + q] * H_p[j, s, q]
-                S[a, 2 * j + s] = v
-        for r in range(2):
-            for s in range(2):
-                S[2 * j + r, 2 * j + s] += cov_z[j, r, s]
-
-
-@kernel(
-    *(changed(2), changed(2), changed(3), changed(3), changed(3)),
-    *(given(4), given(4), given(1, types.int64), given(2), given(3)),
-    returns=made(3),
-)
-def landmark_update(x_p, x_m, P_pp, P_pm, P_mm, H_p, H_l, columns, innovation, cov_z):
-    """Twin of :func:`vslam_ref.filters.block_covariance.landmark_update`."""
-    check_rows(x_m, P_pm, P_mm)
-    k, p, M = innovation.shape[1], x_p.shape[1], x_m.shape[1]
-    S = np.empty((x_p.shape[0], k, k))
-    L, W, tile = np.empty((k, k)), np.empty((k, M + p + 1)), np.empty((k, min(M, TILE)))
-    for b in range(x_p.shape[0]):
-        _general_rows(P_pp[b], P_pm[b], P_mm[b], H_p[b], H_l[b], columns, W)
-        for i in range(k):
-            W[i, M + p] = innovation[b, i]
-        _general_S(W, M, H_p[b], H_l[b], columns, cov_z, S[b])
-        whiten(S[b], L, W)
-        gain(W, x_p[b], x_m[b], P_pp[b], P_pm[b])
-        shrink_map(W, tile, P_mm[b])
-    return S
-
-
-@njit(cache=True)
-def _predict(x, P, P_pm, heading, distance, ds, dalpha, cov):
-    """Predict one run: :func:`ekf_predict` without the batch."""
-    c, s = np.cos(heading), np.sin(heading)
-    x[0] += ds * np.cos(x[2])
-    x[1] += ds * np.sin(x[2])
+def _predict(x, P, P_pm, ds, dalpha, cov):
+    """Predict one run: B4, F and G of :func:`vslam_ref.filters.vehicle.motion_model`, and the covariance."""
+    c, s = np.cos(x[2]), np.sin(x[2])
+    x[0] += ds * c
+    x[1] += ds * s
     x[2] = _wrap(x[2] + dalpha)
-    f0, f1 = -distance * s, distance * c
+    f0, f1 = -ds * s, ds * c
     for q in range(3):
         P[0, q] += f0 * P[2, q]
         P[1, q] += f1 * P[2, q]
@@ -114,11 +57,16 @@ def _predict(x, P, P_pm, heading, distance, ds, dalpha, cov):
         P_pm[1, j] += f1 * P_pm[2, j]
 
 
-@kernel(changed(2), changed(3), changed(3), given(2), given(1), given(1), given(3))
-def ekf_predict(x_p, P_pp, P_pm, at, ds, dalpha, cov):
-    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_predict`."""
+@kernel(changed(2), changed(3), changed(3), given(1), given(1), given(3))
+def _predict_all(x_p, P_pp, P_pm, ds, dalpha, cov):
     for b in range(x_p.shape[0]):
-        _predict(x_p[b], P_pp[b], P_pm[b], at[b, 0], at[b, 1], ds[b], dalpha[b], cov[b])
+        _predict(x_p[b], P_pp[b], P_pm[b], ds[b], dalpha[b], cov[b])
+
+
+@unpacks(_predict_all)
+def ekf_predict_in_place(state, increment):
+    """Twin of :func:`vslam_ref.filters.ekf_slam.ekf_predict_in_place`."""
+    _predict_all(state.x_p, state.P_pp, state.P_pm, *increment)
 
 
 @njit(cache=True)
@@ -129,7 +77,7 @@ def _in_vehicle_frame(c, s, x_p, x_m, column):
 
 
 @njit(cache=True)
-def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, L, W, tile):
+def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, L, W, tile):
     """Update one run, with H v = R^T (v_landmark - v_position) + (left, -ahead) v_heading."""
     M = x_m.shape[0]
     c, s = np.cos(x_p[2]), np.sin(x_p[2])
@@ -159,33 +107,28 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, L, W, 
             for q in range(2):
                 S[2 * j + r, 2 * j + q] += cov_z[j, r, q]
     whiten(S, L, W)
+    apply_gate(gate, W)
     gain(W, x_p, x_m, P_pp, P_pm)
     shrink_map(W, tile, P_mm)
     x_p[2] = _wrap(x_p[2])
 
 
-_UPDATED = (changed(2), changed(2), changed(3), changed(3), changed(3))
-_SEEN = (given(1, types.int64), given(3), given(3), changed(2), changed(3))
-
-
-@kernel(*_UPDATED, *_SEEN)
-def ekf_update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S):
-    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_update`."""
+@kernel(
+    *(changed(2), changed(2), changed(3), changed(3), changed(3)),
+    *(given(1, types.int64), given(3), given(3), types.float64, changed(2), changed(3)),
+)
+def _update_all(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 4)), np.empty((k, min(M, TILE)))
     for b in range(x_p.shape[0]):
         room = innovation[b], S[b], L, W, tile
-        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, *room)
+        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, gate, *room)
 
 
-@kernel(*_UPDATED, given(1), given(1), given(3), *_SEEN)
-def ekf_step(x_p, x_m, P_pp, P_pm, P_mm, ds, dalpha, cov, columns, z, cov_z, innovation, S):
-    """Twin of :func:`vslam_ref.filters.ekf_step.ekf_step`."""
-    check_rows(x_m, P_pm, P_mm)
-    k, M = 2 * columns.shape[0], x_m.shape[1]
-    L, W, tile = np.empty((k, k)), np.empty((k, M + 4)), np.empty((k, min(M, TILE)))
-    for b in range(x_p.shape[0]):
-        _predict(x_p[b], P_pp[b], P_pm[b], x_p[b, 2], ds[b], ds[b], dalpha[b], cov[b])
-        room = innovation[b], S[b], L, W, tile
-        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, *room)
+@unpacks(_update_all)
+def ekf_update_in_place(state, columns, z, cov_z, gate):
+    """Twin of :func:`vslam_ref.filters.ekf_slam.ekf_update_in_place`."""
+    innovation, S = room_for_innovation(z)
+    _update_all(*state, columns, z, cov_z, gate, innovation, S)
+    return innovation, S

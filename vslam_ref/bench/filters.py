@@ -10,9 +10,10 @@ EKF-4 growth of a step from 50 to 200 landmarks, as an exponent
 IM-1  ``import vslam_ref`` against ``import numpy``; first accelerated call with a warm cache
 ===== =========================================================================================
 
-Our step is ``ekf_step`` on plain arrays; what the checks and book-keeping of :class:`EkfSlam` cost is shown
-beside it.  filterpy is used in three ways (``filterpy_peer``): that of its users is the goal's peer; the two
-others have models written for speed and are harder.
+Our step is that of ``filters.ekf_slam`` on plain arrays; what the checks and book-keeping of
+:class:`EkfSlam` cost is shown beside it.  filterpy is used in three ways
+(``filterpy_peer``): that of its users is the goal's peer; the two others have models written for speed and
+are harder.
 
 The reduced IEKF puts increments down and uses them together.  So its cycle is also measured with the pose
 read after every prediction, by both filters, where it cannot.
@@ -24,7 +25,6 @@ import dataclasses
 import importlib.util
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,9 +34,8 @@ from vslam_ref.bench.imports import imports
 from vslam_ref.bench.rows import Row, each_backend, row
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
-from vslam_ref.filters.ekf_slam import EkfSlam
-from vslam_ref.filters.ekf_step import ekf_step
-from vslam_ref.filters.estimates import SlamFilter, room_for_innovation
+from vslam_ref.filters.ekf_slam import EkfSlam, ekf_predict_in_place, ekf_update_in_place
+from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.support.timing import paired
 from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, SEEN, MappedVehicle, cycle_ratios
 from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
@@ -95,11 +94,16 @@ def class_step(world: MappedVehicle) -> Callable[[], object]:
 
 
 def array_step(world: MappedVehicle) -> Callable[[], object]:
-    """The same step by :func:`ekf_step` on plain arrays."""
+    """The same step by the functions on plain arrays, without the class."""
     b = world.start(EkfSlam).blocks
     columns, z, cov_z = b.columns(world.seen), world.z[None, world.seen], np.tile(world.cov_z, (SEEN, 1, 1))
-    state = (b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm)
-    return partial(ekf_step, *state, *world.increment(), columns, z, cov_z, *room_for_innovation(z))
+    state, increment = b.state, world.increment()
+
+    def step() -> None:
+        ekf_predict_in_place(state, increment)
+        ekf_update_in_place(state, columns, z, cov_z, np.inf)
+
+    return step
 
 
 def cycles(backend: str, quick: bool) -> list[Row]:
@@ -133,7 +137,7 @@ def drive(config: VehicleFieldConfig, form: str, runs: int) -> None:
     world = make_field(config, np.random.default_rng(0))
     noise = draw_noise(world, [np.random.default_rng(k) for k in range(runs)])
     for variances in (P0_LOW, P0_HIGH):
-        start, P0 = world.poses[0] + noise.start * np.sqrt(variances), np.diag(variances)
+        start, P0 = world.T_world_vehicle[0] + noise.start * np.sqrt(variances), np.diag(variances)
         _through(EkfSlam(start, P0), world, noise)
         _through(carleman_ekf(start, P0, form), world, noise)
 

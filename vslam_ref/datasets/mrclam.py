@@ -97,7 +97,7 @@ def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
     pose[:, 2] = so2.wrap(pose[:, 2])
     return Truth(
         times=poses.values[:, 0] - log.clock_start,
-        poses=pose,
+        T_world_vehicle=pose,
         max_gap=TRUTH_GAP,
         ids=subjects,
         landmarks=marks.values[:, 1:3],
@@ -219,7 +219,7 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
     ]
     subjects = [*((i, i) for i in ROBOTS), *((i, BARCODE + i) for i in truth.ids.tolist())]
     marks = [(*row, 0.0, 0.0) for row in _rows(truth.ids, truth.landmarks)]
-    poses = _rows(start + truth.times, truth.poses)
+    poses = _rows(start + truth.times, truth.T_world_vehicle)
     tables: dict[str, tuple[str, list[tuple[Any, ...]]]] = {
         "Barcodes.dat": ("subject barcode", subjects),
         f"Robot{robot}_Odometry.dat": ("time_s v_m_s omega_rad_s", _rows(start + log.times, log.controls)),

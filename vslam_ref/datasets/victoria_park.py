@@ -182,7 +182,7 @@ def read_truth(folder: Path, log: SlamLog) -> Truth:
     poses = np.column_stack([xy, np.full(len(xy), np.nan)])[keep]
     return Truth(
         times=times[keep],
-        poses=poses,
+        T_world_vehicle=poses,
         max_gap=GPS_GAP,
         ids=np.zeros(0, dtype=np.int64),
         landmarks=np.zeros((0, 2)),

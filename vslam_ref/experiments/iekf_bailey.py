@@ -94,9 +94,9 @@ def _one(task: Task, child: np.random.SeedSequence) -> Errors:
         z, cov_z = cartesian_from_polar(polar, c.sigma_range, c.sigma_bearing)
         seen[s.step] = (s.ids, z[None], cov_z)
     p0 = np.array(task.config.p0_high if task.start == "high" else (0.0, 0.0, 0.0))
-    mean = world.poses[0] + noise.start * np.sqrt(p0)
+    mean = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
     slam = neighbours.make_filter(task.filter, mean, np.diag(p0), c.landmarks)
-    return neighbours.follow(slam, Drive(increments, seen, world.poses, c.sighting_steps))
+    return neighbours.follow(slam, Drive(increments, seen, world.T_world_vehicle, c.sighting_steps))
 
 
 def run(config: BaileyConfig, context: RunContext) -> Result:

@@ -121,9 +121,9 @@ def simulate(task: Task) -> Errors:
         for s, e in zip(world.sightings, noise.sightings, strict=True)
     }
     increments = vehicle.differential_increment(controls, c.cov_u, c.dt)
-    mean = world.poses[0] + noise.start * np.sqrt(p0)
+    mean = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
     slam = neighbours.make_filter(task.filter, mean, np.diag(p0), c.landmarks)
-    return neighbours.follow(slam, Drive(increments, seen, world.poses, every=1))
+    return neighbours.follow(slam, Drive(increments, seen, world.T_world_vehicle, every=1))
 
 
 def run(config: CircleStudyConfig, context: RunContext) -> Result:

@@ -87,14 +87,14 @@ def simulate(task: Task) -> tuple[Array, Array]:
     sightings = tuple(s for s in world.sightings if s.step <= steps)
     world = world._replace(
         controls=world.controls[:steps],
-        poses=world.poses[: steps + 1],
+        T_world_vehicle=world.T_world_vehicle[: steps + 1],
         times=world.times[: steps + 1],
         sightings=sightings,
     )
     noise = noise._replace(controls=noise.controls[:, :steps], sightings=noise.sightings[: len(sightings)])
     p0 = config.study.p0(task.p0)
     slam = LiftedCarlemanEkf(
-        world.poses[0] + noise.start * np.sqrt(p0),
+        world.T_world_vehicle[0] + noise.start * np.sqrt(p0),
         np.diag(p0),
         len(world.landmarks),
         control="gaussian" if task.variant == "product of means" else "first_order",
@@ -108,8 +108,8 @@ def simulate(task: Task) -> tuple[Array, Array]:
 
 def turned(world: VehicleField, angle: float) -> VehicleField:
     """The same world in axes turned by ``angle`` radians: all relative places stay."""
-    poses = se2.compose(np.array([0.0, 0.0, angle]), world.poses)
-    return world._replace(poses=poses, landmarks=so2.rotate(angle, world.landmarks))
+    poses = se2.compose(np.array([0.0, 0.0, angle]), world.T_world_vehicle)
+    return world._replace(T_world_vehicle=poses, landmarks=so2.rotate(angle, world.landmarks))
 
 
 def run(config: ErrataConfig, context: RunContext) -> Result:

@@ -87,7 +87,9 @@ def simulate(task: Task) -> dict[str, Array]:
     world, c = study_field(config.study), config.study.field
     noise = run_noise(config.study, False, task.first, task.size)
     p0 = config.study.p0(task.p0)
-    forms = make_forms(task, world.poses[0] + noise.start * np.sqrt(p0), np.diag(p0), len(world.landmarks))
+    forms = make_forms(
+        task, world.T_world_vehicle[0] + noise.start * np.sqrt(p0), np.diag(p0), len(world.landmarks)
+    )
     controls = world.controls + noise.controls * np.array([c.sigma_v, c.sigma_phi])
     seen = {s.step: (s, c.sigma_z * e) for s, e in zip(world.sightings, noise.sightings, strict=True)}
     T = controls.shape[1]

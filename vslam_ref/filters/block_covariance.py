@@ -1,6 +1,6 @@
-"""The covariance of pose and map in three blocks, and its measurement update.
+"""Mean and covariance of pose and map in blocks, and the Kalman update of all blocks.
 
-A SLAM covariance is kept as::
+Implements :eq:`eq-blocks`: a SLAM covariance is kept as ::
 
     P = [ P_pp   P_pm ]      p: the p pose states;  m: the map states, b per landmark
         [ P_pm^T P_mm ]
@@ -11,32 +11,29 @@ measurement of k numbers costs O(k n^2).  No full F, H or K H is ever formed.
 
 from __future__ import annotations
 
-import copy
-import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
 
-_XY = np.arange(2)
 
+class State(NamedTuple):
+    """Means and covariance blocks of B runs; a filter's steps change these arrays in place.
 
-_LINE = 8
-"""Numbers in a line of the cache, 64 bytes: vector instructions are slow on numbers that lie across two."""
+    Attributes
+    ----------
+    x_p, x_m : ndarray, shapes (B, p), (B, M)
+        Means of pose and map.
+    P_pp, P_pm, P_mm : ndarray, shapes (B, p, p), (B, p, M), (B, M, M)
+        Blocks of the covariance.
+    """
 
-
-def _zeros(*shape: int) -> Array:
-    """Zeros that begin with a cache line."""
-    size = math.prod(shape)
-    buffer = np.zeros(size + _LINE - 1)
-    first = -(buffer.ctypes.data // buffer.itemsize) % _LINE
-    return buffer[first : first + size].reshape(shape)
-
-
-def _whole_lines(columns: int) -> int:
-    """Columns in an odd number of cache lines: rows a power of two apart would share sets of the cache."""
-    return _LINE * (-(-columns // _LINE) | 1)
+    x_p: Array
+    x_m: Array
+    P_pp: Array
+    P_pm: Array
+    P_mm: Array
 
 
 class Blocks:
@@ -52,26 +49,61 @@ class Blocks:
         States b per landmark.
     capacity : int
         Landmarks to make room for at first; more are made on demand.
+
+    Attributes
+    ----------
+    state : State
+        Views of all blocks.
     """
 
     def __init__(self, mean: Array, cov: Array, landmark_states: int, capacity: int) -> None:
-        batch, p = mean.shape
+        (batch, p), room = mean.shape, max(capacity, 1) * landmark_states
         self.b = landmark_states
-        self.n = 0
-        room = _whole_lines(capacity * self.b)
-        self.x_p = np.array(mean, dtype=np.float64)
-        self.P_pp = np.array(cov, dtype=np.float64)
-        self._x_m = _zeros(batch, room)
-        self._P_pm = _zeros(batch, p, room)
-        self._P_mm = _zeros(batch, room, room)
+        self._x_m = np.zeros((batch, room))
+        self._P_pm = np.zeros((batch, p, room))
+        self._P_mm = np.zeros((batch, room, room))
         self._index: dict[int, int] = {}
-        self._set_views()
+        self._look(np.array(mean, dtype=np.float64), np.array(cov, dtype=np.float64))
 
-    def _set_views(self) -> None:
-        size = self.n * self.b
-        self.x_m = self._x_m[:, :size]
-        self.P_pm = self._P_pm[:, :, :size]
-        self.P_mm = self._P_mm[:, :size, :size]
+    def _look(self, x_p: Array, P_pp: Array) -> None:
+        """Set ``state``: views of all blocks, without the room that is still free."""
+        M = self.b * self.n
+        self.state = State(x_p, self._x_m[:, :M], P_pp, self._P_pm[:, :, :M], self._P_mm[:, :M, :M])
+
+    def __setstate__(self, parts: dict[str, Any]) -> None:
+        """A copy looks at its own arrays."""
+        self.__dict__.update(parts)
+        self._look(self.x_p, self.P_pp)
+
+    @property
+    def n(self) -> int:
+        """Landmarks in the map."""
+        return len(self._index)
+
+    @property
+    def x_p(self) -> Array:
+        """Mean of the pose (B, p)."""
+        return self.state.x_p
+
+    @property
+    def x_m(self) -> Array:
+        """Mean of the map (B, M)."""
+        return self.state.x_m
+
+    @property
+    def P_pp(self) -> Array:
+        """Covariance of the pose (B, p, p)."""
+        return self.state.P_pp
+
+    @property
+    def P_pm(self) -> Array:
+        """Cross covariance of pose and map (B, p, M)."""
+        return self.state.P_pm
+
+    @property
+    def P_mm(self) -> Array:
+        """Covariance of the map (B, M, M)."""
+        return self.state.P_mm
 
     @property
     def ids(self) -> IntArray:
@@ -82,134 +114,153 @@ class Blocks:
         """First map column of each landmark of ``ids``, -1 for one that is not in the map yet."""
         return np.array([self._index.get(i, -1) for i in ids.tolist()], dtype=np.int64)
 
-    def append(self, ids: IntArray, mean: Array, cov: Array, cross_pose: Array, cross_map: Array) -> None:
-        """Add m landmarks: mean (B, mb), cov (B, mb, mb), cross covariances (B, p, mb), (B, n b, mb)."""
+    def append(self, ids: IntArray, mean: Array, G: Array, noise: Array) -> None:
+        """Add m landmarks whose errors are G times the pose's error and errors of their own.
+
+        Implements :eq:`eq-augment`.
+
+        Parameters
+        ----------
+        ids : ndarray of int, shape (m,)
+        mean : ndarray, shape (B, m b)
+        G : ndarray, shape (B, m b, p)
+            Jacobian of the new states in the pose.
+        noise : ndarray, shape (B, m, b, b)
+            Covariance of what each landmark's own measurement adds.
+        """
         old, new = self.n * self.b, (self.n + len(ids)) * self.b
-        if len(set(ids.tolist())) != len(ids):
-            raise ValueError(f"landmark ids {ids.tolist()}: each must appear once in one measurement")
-        if new > self._x_m.shape[1]:
-            self._grow(_whole_lines(max(new, 2 * self._x_m.shape[1])))
+        self._make_room(new)
+        P_pp, P_pm = self.P_pp, self._P_pm[:, :, :old]
+        G_T = G.swapaxes(1, 2)
+        cov, cross = G @ P_pp @ G_T, P_pm.swapaxes(1, 2) @ G_T  # eq-augment
+        diagonal_blocks(cov, self.b)[...] += noise
         self._x_m[:, old:new] = mean
-        self._P_pm[:, :, old:new] = cross_pose
-        self._P_mm[:, :old, old:new] = cross_map
-        self._P_mm[:, old:new, :old] = np.swapaxes(cross_map, 1, 2)
+        self._P_pm[:, :, old:new] = P_pp @ G_T
+        self._P_mm[:, :old, old:new], self._P_mm[:, old:new, :old] = cross, cross.swapaxes(1, 2)
         self._P_mm[:, old:new, old:new] = cov
-        for i in ids:
-            self._index[int(i)] = self.n * self.b
-            self.n += 1
-        self._set_views()
+        self._index |= {i: old + self.b * j for j, i in enumerate(ids.tolist())}
+        self._look(self.x_p, P_pp)
 
-    def _grow(self, room: int) -> None:
-        batch, p, old = self._P_pm.shape
-        x_m, P_pm, P_mm = self._x_m, self._P_pm, self._P_mm
-        self._x_m, self._P_pm = _zeros(batch, room), _zeros(batch, p, room)
-        self._P_mm = _zeros(batch, room, room)
-        self._x_m[:, :old], self._P_pm[:, :, :old], self._P_mm[:, :old, :old] = x_m, P_pm, P_mm
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Blocks:
-        """Copy the arrays once and look at the copies; a plain deep copy would part views from arrays."""
-        twin = copy.copy(self)
-        for name in ("x_p", "P_pp", "_x_m", "_P_pm", "_P_mm"):
-            mine = getattr(self, name)
-            setattr(twin, name, _zeros(*mine.shape))
-            getattr(twin, name)[...] = mine
-        twin._index = dict(self._index)
-        twin._set_views()
-        return twin
+    def _make_room(self, states: int) -> None:
+        """Twice the room at least, when there is not enough for so many map states."""
+        room = self._x_m.shape[1]
+        if states <= room:
+            return
+        more = (0, max(states, 2 * room) - room)
+        self._x_m = np.pad(self._x_m, ((0, 0), more))
+        self._P_pm = np.pad(self._P_pm, ((0, 0), (0, 0), more))
+        self._P_mm = np.pad(self._P_mm, ((0, 0), more, more))
 
     def full(self) -> tuple[Array, Array]:
-        """Mean (B, p + n b) and covariance (B, p + n b, p + n b) as whole arrays (copies)."""
-        mean = np.concatenate([self.x_p, self.x_m], 1)
-        top = np.concatenate([self.P_pp, self.P_pm], 2)
-        bottom = np.concatenate([np.swapaxes(self.P_pm, 1, 2), self.P_mm], 2)
-        return mean, np.concatenate([top, bottom], 1)
+        """Mean (B, p + M) and covariance (B, p + M, p + M) as whole arrays (copies)."""
+        x_p, x_m, P_pp, P_pm, P_mm = self.state
+        return np.concatenate([x_p, x_m], 1), np.block([[P_pp, P_pm], [P_pm.swapaxes(1, 2), P_mm]])
 
 
-@accelerated("slam:landmark_update")
-def landmark_update(
-    x_p: Array,
-    x_m: Array,
-    P_pp: Array,
-    P_pm: Array,
-    P_mm: Array,
-    H_p: Array,
-    H_l: Array,
-    columns: IntArray,
-    innovation: Array,
-    cov_z: Array,
-) -> Array:
-    """Kalman update with m landmarks at once, in place; returns the innovation covariance S.
+class Expected(NamedTuple):
+    """What a measurement of k numbers meets: innovation (B, k), its covariance S (B, k, k), and H P.
 
-    With P H^T = (H P)^T, S = H P H^T + cov_z = L L^T and W = L^-1 H P::
+    H P has the shape (B, k, p + M), the pose's columns first.
+    """
+
+    innovation: Array
+    S: Array
+    HP: Array
+
+
+def kalman_update_in_place(state: State, seen: Expected, gate: float = np.inf) -> None:
+    """Kalman update of means and covariance, in place.
+
+    Implements :eq:`eq-gain`.  With S = L L^T and W = L^-1 H P ::
 
         x += W^T L^-1 innovation          P -= W^T W
 
-    which is K = P H^T S^-1 without K, and keeps P symmetric to the last bit.
+    which is K = P H^T S^-1 without K, and keeps P symmetric to the last bit.  The normalised innovation
+    squared is the square of L^-1 innovation: a run in which it exceeds ``gate`` stays as it is.
 
-    Parameters
-    ----------
-    x_p, x_m : ndarray, shapes (B, p), (B, M)
-        Means of pose and map, changed in place.
-    P_pp, P_pm, P_mm : ndarray, shapes (B, p, p), (B, p, M), (B, M, M)
-        Covariance blocks, changed in place.
-    H_p : ndarray, shape (B, m, 2, p)
-        Jacobian of each landmark's measurement in the pose.
-    H_l : ndarray, shape (B, m, 2, 2)
-        Jacobian in the two map states that start at ``columns``.
-    columns : ndarray of int, shape (m,)
-    innovation : ndarray, shape (B, 2 m)
-        measured - predicted.
-    cov_z : ndarray, shape (m, 2, 2)
-        Measurement covariance of each landmark; the measurements are independent.
-
-    Returns
-    -------
-    ndarray, shape (B, 2 m, 2 m)
-        S.
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If S is not positive definite.
     """
-    B, m, _, p = H_p.shape
-    k, M = 2 * m, P_mm.shape[2]
-    pairs = map_columns(columns)
-    H = np.zeros((B, k, p + k))  # in the pose and the landmarks seen; elsewhere it is zero
-    H[:, :, :p] = H_p.reshape(B, k, p)
-    landmark_blocks(H[:, :, p:])[...] = H_l
-    rows = np.empty((B, p + k, p + M))  # the rows of P that H meets
-    rows[:, :p, :p], rows[:, :p, p:] = P_pp, P_pm
-    rows[:, p:, :p], rows[:, p:, p:] = P_pm.take(pairs, 2).swapaxes(1, 2), P_mm.take(pairs, 1)
-    HP = H @ rows
-    met = np.concatenate([np.arange(p), p + pairs])
-    S = HP.take(met, 2) @ H.swapaxes(1, 2)
-    landmark_blocks(S)[...] += cov_z
-    W, y = whitened(HP, innovation, S)
-    move_means(x_p, x_m, W, y)
+    x_p, x_m, P_pp, P_pm, P_mm = state
+    p = x_p.shape[1]
+    both = np.concatenate([seen.HP, seen.innovation[:, :, None]], 2)
+    both = np.linalg.inv(np.linalg.cholesky(seen.S)) @ both
+    if gate < np.inf:
+        both[np.sum(both[:, :, -1] ** 2, 1) > gate] = 0.0
+    W, y = both[:, :, :-1], both[:, :, -1:]
+    step = (y.swapaxes(1, 2) @ W)[:, 0]
+    x_p += step[:, :p]  # eq-gain
+    x_m += step[:, p:]
     WW = W.swapaxes(1, 2) @ W
     P_pp -= WW[:, :p, :p]
     P_pm -= WW[:, :p, p:]
     P_mm -= WW[:, p:, p:]
-    return S
+
+
+def expected_landmarks(
+    state: State, columns: IntArray, H_p: Array, H_l: Array, innovation: Array, cov_z: Array
+) -> Expected:
+    """H P and S = H P H^T + cov_z of m landmarks; H is zero elsewhere.  Nothing is changed.
+
+    Implements :eq:`eq-innovation`.
+
+    Parameters
+    ----------
+    state : State
+    columns : ndarray of int, shape (m,)
+        First map column of each landmark.
+    H_p : ndarray, shape (B, m, 2, p) or (m, 2, p)
+        Jacobian of each landmark's measurement in the pose.
+    H_l : ndarray, shape (B, m, 2, 2) or (m, 2, 2)
+        Jacobian in the two map states that start at ``columns``.
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted.
+    cov_z : ndarray, shape (m, 2, 2)
+        Measurement covariance of each landmark; the measurements are independent.
+    """
+    (B, k), p, pairs = innovation.shape, state.x_p.shape[1], map_columns(columns)
+    H = np.zeros((B, k, p + k))  # in the pose and the landmarks seen
+    H[:, :, :p] = H_p.reshape(-1, k, p)
+    diagonal_blocks(H[:, :, p:])[...] = H_l
+    rows = np.empty((B, p + k, p + state.x_m.shape[1]))  # the rows of P that H meets
+    rows[:, :p, :p], rows[:, :p, p:] = state.P_pp, state.P_pm
+    rows[:, p:, :p], rows[:, p:, p:] = state.P_pm.take(pairs, 2).swapaxes(1, 2), state.P_mm.take(pairs, 1)
+    HP = H @ rows
+    S = HP.take(np.concatenate([np.arange(p), p + pairs]), 2) @ H.swapaxes(1, 2)
+    diagonal_blocks(S)[...] += cov_z  # eq-innovation
+    return Expected(innovation, S, HP)
 
 
 def map_columns(columns: IntArray) -> IntArray:
-    """Columns (2 m,) of both coordinates of the landmarks that start at ``columns`` (m,)."""
-    return (columns[:, None] + _XY).ravel()
+    """Columns of both coordinates of landmarks.
+
+    Parameters
+    ----------
+    columns : ndarray of int, shape (m,)
+        First map column of each.
+
+    Returns
+    -------
+    ndarray of int, shape (2 m,)
+    """
+    return (columns[:, None] + np.arange(2)).ravel()
 
 
-def landmark_blocks(A: Array) -> Array:
-    """View (B, m, 2, 2) of the 2 x 2 blocks on the diagonal of A (B, 2 m, 2 m)."""
-    m = A.shape[1] // 2
-    blocks: Array = np.einsum("bkikj->bkij", A.reshape(len(A), m, 2, m, 2))
+def diagonal_blocks(A: Array, b: int = 2) -> Array:
+    """Square blocks on the diagonal, as a view where A lies in one piece.
+
+    Parameters
+    ----------
+    A : ndarray, shape (B, b m, b m)
+    b : int
+        Rows of a block.
+
+    Returns
+    -------
+    ndarray, shape (B, m, b, b)
+    """
+    m = A.shape[1] // b
+    blocks: Array = np.einsum("bkikj->bkij", A.reshape(len(A), m, b, m, b))
     return blocks
-
-
-def whitened(HP: Array, innovation: Array, S: Array) -> tuple[Array, Array]:
-    """W = L^-1 H P (B, k, D) and L^-1 innovation (B, k), with S = L L^T."""
-    both = np.concatenate([HP, innovation[:, :, None]], 2)
-    both = np.linalg.inv(np.linalg.cholesky(S)) @ both
-    return both[:, :, :-1], both[:, :, -1]
-
-
-def move_means(x_p: Array, x_m: Array, W: Array, y: Array) -> None:
-    """Add W^T y, the gain times the innovation, to the means, pose first."""
-    step = (y[:, None] @ W)[:, 0]
-    x_p += step[:, : x_p.shape[1]]
-    x_m += step[:, x_p.shape[1] :]

@@ -10,10 +10,10 @@
 * :class:`AnchoredEkf`: the same filter started at zero covariance in its own start frame; the
   uncertain start N(x0, P0) is composed with its output.  P0, which no relative measurement can
   reduce, never meets a measurement.
-* ``EkfSlam(..., truth=...)``, the *ideal* EKF: Jacobians at the true state.  No real filter can
-  have them; it is a control.
+* :class:`IdealEkf`: Jacobians at the true state.  No real filter can have them; it is a control.
 
-All runs of a batch share the landmark schedule; each has its own noises.
+All runs of a batch share the landmark schedule; each has its own noises.  :mod:`.book` is the same filter
+for one run in full matrices.
 """
 
 from __future__ import annotations
@@ -23,30 +23,119 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, IntArray, transpose
 from vslam_ref.filters import observation, vehicle
-from vslam_ref.filters.block_covariance import Blocks, landmark_update
-from vslam_ref.filters.ekf_step import ekf_predict, ekf_update
-from vslam_ref.filters.estimates import (
-    Innovation,
-    MapEstimate,
-    PoseEstimate,
-    as_batch,
-    checked_measurement,
+from vslam_ref.filters.block_covariance import (
+    Blocks,
+    Expected,
+    State,
     diagonal_blocks,
-    room_for_innovation,
+    expected_landmarks,
+    kalman_update_in_place,
 )
+from vslam_ref.filters.estimates import Innovation, MapEstimate, PoseEstimate, SlamFilter, as_batch
+from vslam_ref.filters.observation import ObservationJacobians, PlacementJacobians
 from vslam_ref.geometry import se2, so2
 
-
-class Truth(NamedTuple):
-    """True poses (T + 1, 3) and landmarks by identity (n, 2), for the ideal EKF only."""
-
-    poses: Array
-    landmarks: Array
+# -- the steps, on the arrays of a batch ---------------------------------------------------------------
 
 
-class EkfSlam:
+@accelerated("slam:ekf_predict_in_place")
+def ekf_predict_in_place(state: State, increment: vehicle.Increment) -> None:
+    """Predict with F and G at the estimate.
+
+    Implements :eq:`eq-predict`.
+
+    Parameters
+    ----------
+    state : State
+        ``x_p``, ``P_pp`` and ``P_pm`` are changed in place.
+    increment : Increment
+        Of B runs.
+    """
+    moved = vehicle.motion_model(state.x_p, increment.ds, increment.dalpha)
+    state.x_p[...] = moved.value
+    move_covariance_in_place(state, moved.J_pose, moved.J_increment, increment.cov)
+
+
+def move_covariance_in_place(state: State, F: Array, G: Array, Q: Array) -> None:
+    """Move the covariance of pose and cross terms, and add the noise of the increment.
+
+    Implements :eq:`eq-predict`.
+
+    Parameters
+    ----------
+    state : State
+        ``P_pp`` and ``P_pm`` are changed in place.
+    F : ndarray, shape (B, 3, 3) or (3, 3)
+        Jacobian of the motion in the pose.
+    G : ndarray, shape (B, 3, 2) or (3, 2)
+        Jacobian in (ds, dalpha).
+    Q : ndarray, shape (B, 2, 2)
+        Covariance of (ds, dalpha), m^2, m rad, rad^2.
+    """
+    state.P_pp[...] = F @ state.P_pp @ F.swapaxes(-1, -2) + G @ Q @ G.swapaxes(-1, -2)  # eq-predict
+    state.P_pm[...] = F @ state.P_pm
+
+
+@accelerated("slam:ekf_update_in_place")
+def ekf_update_in_place(
+    state: State, columns: IntArray, z: Array, cov_z: Array, gate: float
+) -> tuple[Array, Array]:
+    """Update with m landmarks of the map at once, linearised at the estimate.
+
+    Implements :eq:`eq-innovation` and :eq:`eq-gain`.
+
+    Parameters
+    ----------
+    state : State
+        Changed in place.
+    columns : ndarray of int, shape (m,)
+        First map column of each landmark seen.
+    z : ndarray, shape (B, m, 2)
+        Relative Cartesian measurements, metres, vehicle frame.
+    cov_z : ndarray, shape (m, 2, 2)
+        Their covariances, m^2; the measurements are independent.
+    gate : float
+        Runs whose normalised innovation squared is larger stay as they are.
+
+    Returns
+    -------
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted, metres.
+    S : ndarray, shape (B, 2 m, 2 m)
+        Its covariance, m^2.
+    """
+    seen = expected(state, columns, z, cov_z)
+    correct_in_place(state, seen, gate)
+    return seen.innovation, seen.S
+
+
+def expected(
+    state: State, columns: IntArray, z: Array, cov_z: Array, at: ObservationJacobians | None = None
+) -> Expected:
+    """Innovation, S and H P of landmarks of the map; the Jacobians are those ``at`` another place, if given.
+
+    Implements :eq:`eq-innovation`.  Other parameters as for :func:`ekf_update_in_place`; nothing is changed.
+    """
+    B, m, _ = z.shape
+    landmarks = state.x_m.reshape(B, -1, 2)[:, columns // 2]
+    here = observation.vehicle_from_world_with_jacobians(state.x_p[:, None], landmarks)
+    H, innovation = at or here, (z - here.value).reshape(B, 2 * m)  # eq-b20
+    return expected_landmarks(state, columns, H.J_pose, H.J_landmark, innovation, cov_z)
+
+
+def correct_in_place(state: State, seen: Expected, gate: float) -> None:
+    """Correct means and covariance by an innovation; the heading stays in (-pi, pi]."""
+    kalman_update_in_place(state, seen, gate)
+    state.x_p[:, 2] = so2.wrap(state.x_p[:, 2])
+
+
+# -- the filters ---------------------------------------------------------------------------------------
+
+
+class EkfSlam(SlamFilter):
     """EKF-SLAM for a batch of runs.
 
     Implements the state of :eq:`eq-b1`, :eq:`eq-b2` and :eq:`eq-b3` (B1-B3): pose, then landmarks.
@@ -59,114 +148,49 @@ class EkfSlam:
         Its covariance; a given value, zero allowed.
     capacity : int
         Landmarks to make room for (the map grows beyond it when it must).
-    truth : Truth, optional
-        Take every Jacobian at this truth instead of the estimate: the ideal EKF.
+
+    Examples
+    --------
+    >>> slam = EkfSlam([0.0, 0.0, 0.0], 0.01 * np.eye(3))
+    >>> slam.update([7], [[[2.0, 1.0]]], 0.01 * np.eye(2))  # a landmark seen for the first time
+    >>> slam.landmarks().mean
+    array([[[2., 1.]]])
     """
 
-    def __init__(
-        self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32, truth: Truth | None = None
-    ) -> None:
-        x, P = as_batch(mean, cov)
-        self.blocks = Blocks(x, P, landmark_states=2, capacity=capacity)
-        self._truth = truth
-        self._step = 0
-
-    def _linearisation(self) -> Array:
-        """Pose (B, 3) at which Jacobians are taken."""
-        if self._truth is None:
-            return self.blocks.x_p
-        return np.broadcast_to(self._truth.poses[self._step], self.blocks.x_p.shape)
+    def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32) -> None:
+        self.blocks = Blocks(*as_batch(mean, cov), landmark_states=2, capacity=capacity)
+        self.runs = len(self.blocks.x_p)
 
     def predict(self, increment: vehicle.Increment) -> None:
-        """Move the pose by an increment; the map stays. Implements :eq:`eq-b4` (B4)."""
-        b = self.blocks
-        at = np.empty((len(b.x_p), 2))
-        at[:, 0], at[:, 1] = self._linearisation()[:, 2], self._distance(increment)
-        ekf_predict(b.x_p, b.P_pp, b.P_pm, at, *increment)
-        self._step += 1
+        """Move the pose by an increment; the map stays."""
+        ekf_predict_in_place(self.blocks.state, increment)
 
-    def _distance(self, increment: vehicle.Increment) -> Array:
-        """Distance (B,) at which F is taken: measured, or true for the ideal EKF.
+    def _columns(self, ids: IntArray) -> IntArray:
+        return self.blocks.columns(ids)
 
-        With true headings and *measured* distances F would not carry the unobservable rotation from
-        one true pose to the next, and the control would gain heading information from nothing.
-        """
-        if self._truth is None:
-            return increment.ds
-        here, there = self._truth.poses[self._step], self._truth.poses[self._step + 1]
-        ahead = np.array([np.cos(here[2]), np.sin(here[2])])
-        return np.full(len(increment.ds), (there - here)[:2] @ ahead)
+    def _jacobians(self, columns: IntArray) -> ObservationJacobians | None:
+        """Jacobians of landmarks of the map; None for those at the estimate."""
+        return None
 
-    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
-        """Update with landmarks already in the map, then add those seen for the first time.
+    def _innovation(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
+        seen = expected(self.blocks.state, columns, z, cov_z, self._jacobians(columns))
+        return Innovation(seen.innovation, seen.S)
 
-        Parameters
-        ----------
-        ids : array_like of int, shape (m,)
-            Identities (known association), each once.
-        z : array_like, shape (B, m, 2)
-            Relative Cartesian measurements, metres, vehicle frame.
-        cov_z : array_like, shape (2, 2) or (m, 2, 2)
-            Their covariance.
-
-        Returns
-        -------
-        Innovation or None
-            None when no landmark was known before.
-        """
-        ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self.blocks.x_p))
-        columns = self.blocks.columns(ids)
-        known = columns >= 0
-        if known.all():
-            return self._update_known(ids, columns, z, cov_z) if len(ids) else None
-        seen = None
-        if known.any():
-            seen = self._update_known(ids[known], columns[known], z[:, known], cov_z[known])
-        self._augment(ids[~known], z[:, ~known], cov_z[~known])
-        return seen
-
-    def _update_known(self, ids: IntArray, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
-        """Update with the measurement z = h + noise. Implements :eq:`eq-b20` (B20)."""
-        b = self.blocks
-        if self._truth is None:
-            seen = room_for_innovation(z)
-            ekf_update(b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, columns, z, cov_z, *seen)
-            return seen
-        landmarks = b.x_m.reshape(len(b.x_p), -1, 2)[:, columns // 2]
-        innovation = (z - observation.vehicle_from_world(b.x_p[:, None], landmarks)).reshape(len(z), -1)
-        H = observation.vehicle_from_world_with_jacobians(
-            self._linearisation()[:, None], self._truth.landmarks[None, ids]
-        )
-        S = landmark_update(
-            b.x_p, b.x_m, b.P_pp, b.P_pm, b.P_mm, H.J_pose, H.J_landmark, columns, innovation, cov_z
-        )
-        b.x_p[:, 2] = so2.wrap(b.x_p[:, 2])
-        return Innovation(innovation, S)
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        return Innovation(*ekf_update_in_place(self.blocks.state, columns, z, cov_z, gate))
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """Add landmarks with their cross covariances; all pairs of new ones share the pose error."""
         b = self.blocks
-        B, m = z.shape[:2]
         mean = observation.world_from_vehicle(b.x_p[:, None], z)
-        J = observation.world_from_vehicle_with_jacobians(
-            self._linearisation()[:, None], self._placed_at(ids, z)
-        )
-        G = J.J_pose.reshape(B, 2 * m, 3)
-        cov = G @ b.P_pp @ G.swapaxes(1, 2)
-        noise = J.J_measurement @ cov_z @ J.J_measurement.swapaxes(2, 3)
-        for j in range(m):
-            cov[:, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += noise[:, j]
-        cross_pose = b.P_pp @ G.swapaxes(1, 2)
-        cross_map = b.P_pm.swapaxes(1, 2) @ G.swapaxes(1, 2)
-        b.append(ids, mean.reshape(B, -1), cov, cross_pose, cross_map)
+        J = self._placement(ids, z)
+        G = J.J_pose.reshape(len(z), -1, 3)
+        noise = J.J_measurement @ cov_z @ transpose(J.J_measurement)
+        b.append(ids, mean.reshape(len(z), -1), G, noise)
 
-    def _placed_at(self, ids: IntArray, z: Array) -> Array:
-        """Relative landmark at which the placement is linearised: measured, or true for the ideal EKF."""
-        if self._truth is None:
-            return z
-        return observation.vehicle_from_world(
-            self._linearisation()[:, None], self._truth.landmarks[None, ids]
-        )
+    def _placement(self, ids: IntArray, z: Array) -> PlacementJacobians:
+        """Jacobians of a new landmark's place."""
+        return observation.world_from_vehicle_with_jacobians(self.blocks.x_p[:, None], z)
 
     def pose(self) -> PoseEstimate:
         """Pose mean (B, 3) and covariance (B, 3, 3), copies."""
@@ -174,11 +198,67 @@ class EkfSlam:
 
     def landmarks(self) -> MapEstimate:
         """The map in the world frame, copies."""
-        b = self.blocks
-        return MapEstimate(b.ids, b.x_m.reshape(len(b.x_p), -1, 2).copy(), diagonal_blocks(b.P_mm, 2, 2))
+        ids, (x_p, x_m, _, _, P_mm) = self.blocks.ids, self.blocks.state
+        return MapEstimate(ids, x_m.reshape(len(x_p), -1, 2).copy(), diagonal_blocks(P_mm).copy())
 
 
-class AnchoredEkf:
+class Truth(NamedTuple):
+    """True poses T_world_vehicle (T + 1, 3) and landmarks by identity (n, 2), for the ideal EKF only."""
+
+    T_world_vehicle: Array
+    landmarks: Array
+
+
+class IdealEkf(EkfSlam):
+    """EKF-SLAM whose Jacobians are taken at the truth: a control, not a method.
+
+    Parameters
+    ----------
+    mean, cov, capacity
+        As for :class:`EkfSlam`.
+    truth : Truth
+        Pose at the start and after every prediction, and the landmarks.
+    """
+
+    def __init__(self, mean: ArrayLike, cov: ArrayLike, truth: Truth, capacity: int = 32) -> None:
+        super().__init__(mean, cov, capacity)
+        self._truth = truth
+        self._step = 0
+
+    @property
+    def _true_pose(self) -> Array:
+        return np.asarray(self._truth.T_world_vehicle[self._step])
+
+    def predict(self, increment: vehicle.Increment) -> None:
+        """Move the pose by an increment, F and G at the true pose and the true distance.
+
+        With true headings and *measured* distances F would not carry the unobservable rotation from
+        one true pose to the next, and the control would gain heading information from nothing.
+        """
+        here, state = self._true_pose, self.blocks.state
+        self._step += 1
+        ahead = np.array([np.cos(here[2]), np.sin(here[2])])
+        at = vehicle.motion_model(here, (self._true_pose - here)[:2] @ ahead, np.zeros(()))
+        state.x_p[...] = vehicle.motion_model(state.x_p, increment.ds, increment.dalpha).value
+        move_covariance_in_place(state, at.J_pose, at.J_increment, increment.cov)
+
+    def _jacobians(self, columns: IntArray) -> ObservationJacobians:
+        true = self._truth.landmarks[self.blocks.ids[columns // 2]]
+        return observation.vehicle_from_world_with_jacobians(self._true_pose, true)
+
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        state = self.blocks.state
+        seen = expected(state, columns, z, cov_z, self._jacobians(columns))
+        correct_in_place(state, seen, gate)
+        return Innovation(seen.innovation, seen.S)
+
+    def _placement(self, ids: IntArray, z: Array) -> PlacementJacobians:
+        true = observation.vehicle_from_world(self._true_pose, self._truth.landmarks[ids])
+        pose = np.broadcast_to(self._true_pose, (len(z), 1, 3))
+        return observation.world_from_vehicle_with_jacobians(pose, true)
+
+
+class AnchoredEkf(EkfSlam):
     """EKF-SLAM anchored in its start frame: the uncertain start is composed with the output.
 
     Parameters
@@ -195,30 +275,25 @@ class AnchoredEkf:
 
     def __init__(self, mean: ArrayLike, cov: ArrayLike, capacity: int = 32) -> None:
         self._start = PoseEstimate(*as_batch(mean, cov))
-        self.local = EkfSlam(np.zeros_like(self._start.mean), np.zeros((3, 3)), capacity)
-
-    def predict(self, increment: vehicle.Increment) -> None:
-        """As :meth:`EkfSlam.predict`, in the start frame."""
-        self.local.predict(increment)
-
-    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
-        """As :meth:`EkfSlam.update`, in the start frame."""
-        return self.local.update(ids, z, cov_z)
+        super().__init__(np.zeros_like(self._start.mean), np.zeros((3, 3)), capacity)
 
     def pose(self) -> PoseEstimate:
-        """Pose in the world: N(x0, P0) composed with the local estimate, first order."""
-        start, local = self._start, self.local.pose()
+        """Pose in the world: N(x0, P0) composed with the local estimate, to first order.
+
+        Implements :eq:`eq-anchored`.
+        """
+        start, local = self._start, super().pose()
         at = observation.world_from_vehicle_with_jacobians(start.mean, local.mean[:, :2])
-        J_start, J_local = np.zeros_like(start.cov), np.zeros_like(start.cov)
-        J_start[:, :2], J_start[:, 2, 2] = at.J_pose, 1.0
-        J_local[:, :2, :2], J_local[:, 2, 2] = at.J_measurement, 1.0
-        cov = J_start @ start.cov @ J_start.swapaxes(1, 2) + J_local @ local.cov @ J_local.swapaxes(1, 2)
+        J_0, J_l = np.zeros_like(start.cov), np.zeros_like(start.cov)
+        J_0[:, :2], J_0[:, 2, 2] = at.J_pose, 1.0
+        J_l[:, :2, :2], J_l[:, 2, 2] = at.J_measurement, 1.0
+        cov = J_0 @ start.cov @ transpose(J_0) + J_l @ local.cov @ transpose(J_l)  # eq-anchored
         return PoseEstimate(se2.compose(start.mean, local.mean), cov)
 
     def landmarks(self) -> MapEstimate:
         """The map in the world frame, the start's uncertainty composed to first order."""
-        start, local = self._start, self.local.landmarks()
+        start, local = self._start, super().landmarks()
         at = observation.world_from_vehicle_with_jacobians(start.mean[:, None], local.mean)
-        cov = at.J_pose @ start.cov[:, None] @ at.J_pose.swapaxes(2, 3)
-        cov += at.J_measurement @ local.cov @ at.J_measurement.swapaxes(2, 3)
+        cov = at.J_pose @ start.cov[:, None] @ transpose(at.J_pose)
+        cov += at.J_measurement @ local.cov @ transpose(at.J_measurement)
         return MapEstimate(local.ids, at.value, cov)

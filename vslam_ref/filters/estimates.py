@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, IntArray, transpose
 from vslam_ref.filters.vehicle import Increment
 
 
@@ -16,12 +17,6 @@ class Innovation(NamedTuple):
 
     innovation: Array
     S: Array
-
-
-def room_for_innovation(z: Array) -> Innovation:
-    """Empty arrays for the innovation of measurements z (B, m, 2)."""
-    B, m, _ = z.shape
-    return Innovation(np.empty((B, 2 * m)), np.empty((B, 2 * m, 2 * m)))
 
 
 class PoseEstimate(NamedTuple):
@@ -39,20 +34,98 @@ class MapEstimate(NamedTuple):
     cov: Array
 
 
-class SlamFilter(Protocol):
-    """What all filters of this room do; B runs at once, the same landmark schedule in each."""
+class SlamFilter(ABC):
+    """What all filters of this room do; B runs at once, the same landmark schedule in each.
 
+    A filter says how it moves, how it uses landmarks of its map, and how a new one enters.  Here stand the
+    checks, and which landmark of a sighting is known and which is new.
+
+    Attributes
+    ----------
+    runs : int
+        Runs B of the batch.
+    """
+
+    runs: int
+
+    @abstractmethod
     def predict(self, increment: Increment) -> None:
         """Move by an increment."""
 
-    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
-        """Use relative measurements; add landmarks seen for the first time."""
-
+    @abstractmethod
     def pose(self) -> PoseEstimate:
         """Pose in the world."""
 
+    @abstractmethod
     def landmarks(self) -> MapEstimate:
         """Map in the world."""
+
+    @abstractmethod
+    def _columns(self, ids: IntArray) -> IntArray:
+        """Place (m,) of each landmark in the map, -1 for one that is not in it."""
+
+    @abstractmethod
+    def _innovation(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
+        """Innovation of landmarks of the map; the estimate stays."""
+
+    @abstractmethod
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        """Use measurements of landmarks of the map, in the runs whose innovation passes the gate."""
+
+    @abstractmethod
+    def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
+        """Add landmarks to the map."""
+
+    def update(
+        self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike, gate: float = np.inf
+    ) -> Innovation | None:
+        """Update with landmarks already in the map, then add those seen for the first time.
+
+        Parameters
+        ----------
+        ids : array_like of int, shape (m,)
+            Identities (known association), each once.
+        z : array_like, shape (B, m, 2)
+            Relative Cartesian measurements, metres, vehicle frame.
+        cov_z : array_like, shape (2, 2) or (m, 2, 2)
+            Their covariance, m^2.
+        gate : float
+            Where the normalised innovation squared of the known landmarks together is larger, that run
+            does not use them.
+
+        Returns
+        -------
+        Innovation or None
+            Of the known landmarks, used or not.  None when no landmark was known before.
+
+        Raises
+        ------
+        ValueError
+            On other shapes, an identity twice, or numbers that are not finite; nothing is changed then.
+        """
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, self.runs)
+        columns = self._columns(ids)
+        known = columns >= 0
+        if len(ids) and known.all():  # the common case, without copies
+            return self._update_known(columns, z, cov_z, gate)
+        seen = None
+        if known.any():
+            seen = self._update_known(columns[known], z[:, known], cov_z[known], gate)
+        if len(ids):
+            self._augment(ids[~known], z[:, ~known], cov_z[~known])
+        return seen
+
+    def innovation(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
+        """Innovation and S that :meth:`update` would return; no estimate changes.
+
+        For an association, or a gate that needs more than one number (:meth:`update` has one of its own).
+
+        Parameters, errors and result as for :meth:`update`; landmarks that are not in the map are left out.
+        """
+        ids, z, cov_z = checked_measurement(ids, z, cov_z, self.runs)
+        columns = self._columns(ids)
+        known = columns >= 0
+        return self._innovation(columns[known], z[:, known], cov_z[known]) if known.any() else None
 
 
 def as_batch(mean: ArrayLike, cov: ArrayLike) -> tuple[Array, Array]:
@@ -98,7 +171,17 @@ def checked_measurement(
     return ids, z, cov_z if cov_z.ndim == 3 else np.broadcast_to(cov_z, (len(ids), 2, 2))
 
 
-def diagonal_blocks(P: Array, stride: int, size: int) -> Array:
-    """Blocks of ``size`` states at every ``stride``-th diagonal place of P (B, M, M): (B, n, size, size)."""
-    at = np.arange(0, P.shape[1], stride)[:, None] + np.arange(size)
-    return P[:, at[:, :, None], at[:, None, :]]
+def heading_vector_pose(mean: Array, cov: Array) -> PoseEstimate:
+    """(x, y, atan2(sin, cos)) of states (x, y, sin, cos), shape (B, 4), to first order (B§4.1)."""
+    x, y, s, c = mean.T
+    J = np.zeros((len(mean), 3, 4))
+    J[:, 0, 0] = J[:, 1, 1] = 1.0
+    J[:, 2, 2], J[:, 2, 3] = c / (s * s + c * c), -s / (s * s + c * c)
+    return PoseEstimate(np.stack([x, y, np.arctan2(s, c)], -1), J @ cov @ transpose(J))
+
+
+def checked_moments(name: str, kind: str) -> str:
+    """Return the way to take moments, "first_order" or "gaussian", or raise a ValueError with the choices."""
+    if kind not in ("first_order", "gaussian"):
+        raise ValueError(f"{name}={kind!r}: must be 'first_order' or 'gaussian'")
+    return kind

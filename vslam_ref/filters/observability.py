@@ -75,10 +75,24 @@ class Nullity(NamedTuple):
 
 
 def observability_matrix(run: LinearisedRun) -> Array:
-    """Local observability matrix (rows, D): every H_k times the product of the F before it."""
+    """Local observability matrix: every H_k times the product of the F before it.
+
+    Parameters
+    ----------
+    run : LinearisedRun
+
+    Returns
+    -------
+    ndarray, shape (rows, D)
+
+    Raises
+    ------
+    ValueError
+        If there are not as many transitions as sightings, or none.
+    """
     if len(run.transitions) != len(run.measurements) or not run.transitions:
-        told = f"{len(run.transitions)} transitions and {len(run.measurements)} sightings"
-        raise ValueError(f"{told}: need as many, and at least one")
+        given = f"{len(run.transitions)} transitions and {len(run.measurements)} sightings"
+        raise ValueError(f"{given}: need as many, and at least one")
     carried = np.eye(len(run.transitions[0]))
     rows = []
     for F, H in zip(run.transitions, run.measurements, strict=True):
@@ -127,9 +141,25 @@ def _sighting(pose: Array, ids: IntArray, places: Array, landmarks: int) -> Arra
     return H.reshape(2 * len(ids), H.shape[2])
 
 
-def linearise_truth(poses: ArrayLike, landmarks: ArrayLike, sightings: Sequence[ArrayLike]) -> LinearisedRun:
-    """Jacobians at true poses (T + 1, 3) and landmarks (n, 2); ``sightings[k]``: ids seen from pose k + 1."""
-    poses, landmarks = np.asarray(poses, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
+def linearise_truth(
+    T_world_vehicle: ArrayLike, landmarks: ArrayLike, sightings: Sequence[ArrayLike]
+) -> LinearisedRun:
+    """Jacobians of a run at the truth.
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (T + 1, 3)
+        True poses (x, y, theta), metres and radians.
+    landmarks : array_like, shape (n, 2)
+        World frame, metres.
+    sightings : sequence of array_like of int
+        ``sightings[k]``: the landmarks seen from pose k + 1.
+
+    Returns
+    -------
+    LinearisedRun
+    """
+    poses, landmarks = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     F, H = [], []
     for k, seen in enumerate(sightings):
         ids = np.asarray(seen, dtype=np.int64)
@@ -180,12 +210,23 @@ def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "firs
     return LinearisedRun(tuple(F), tuple(H))
 
 
-def lift_tangent(pose: ArrayLike, landmarks: ArrayLike) -> Array:
-    """Derivative (11 + 6 n, 3 + 2 n) of the lift in pose (3,) and landmarks (n, 2): B14 and B15.
+def lift_tangent(T_world_vehicle: ArrayLike, landmarks: ArrayLike) -> Array:
+    """Derivative of the lift in pose and landmarks: B14 and B15.
 
     Its columns span the tangent space of the manifold on which lifted states of real vehicles lie.
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (3,)
+        Pose (x, y, theta), metres and radians.
+    landmarks : array_like, shape (n, 2)
+        World frame, metres.
+
+    Returns
+    -------
+    ndarray, shape (11 + 6 n, 3 + 2 n)
     """
-    pose, places = np.asarray(pose, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
+    pose, places = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmarks, dtype=np.float64)
     n, s, c = len(places), np.sin(pose[2]), np.cos(pose[2])
     J = np.zeros((lift.VEHICLE + lift.LANDMARK * n, 3 + 2 * n))
     J[: lift.VEHICLE, :3] = lift.lift_vehicle_jacobian(pose)

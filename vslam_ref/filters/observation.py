@@ -32,14 +32,14 @@ class PlacementJacobians(NamedTuple):
     J_measurement: Array
 
 
-def vehicle_from_world(pose: ArrayLike, landmark: ArrayLike) -> Array:
+def vehicle_from_world(T_world_vehicle: ArrayLike, landmark: ArrayLike) -> Array:
     """Landmark in the vehicle frame, R(theta)^T (landmark - position).
 
     Implements :eq:`eq-b21` (B21).
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
+    T_world_vehicle : array_like, shape (..., 3)
         Vehicle pose (x, y, theta) in the world, metres and radians.
     landmark : array_like, shape (..., 2)
         World coordinates, metres.
@@ -49,18 +49,20 @@ def vehicle_from_world(pose: ArrayLike, landmark: ArrayLike) -> Array:
     ndarray, shape (..., 2)
         Vehicle coordinates, metres.
     """
-    return se2.act(se2.inverse(pose), landmark)
+    return se2.act(se2.inverse(T_world_vehicle), landmark)
 
 
-def vehicle_from_world_with_jacobians(pose: ArrayLike, landmark: ArrayLike) -> ObservationJacobians:
+def vehicle_from_world_with_jacobians(
+    T_world_vehicle: ArrayLike, landmark: ArrayLike
+) -> ObservationJacobians:
     """:func:`vehicle_from_world` and its Jacobians; same parameters."""
-    pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
+    pose, landmark = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
     d = landmark - pose[..., :2]
     c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
     value, J_pose, J_landmark = np.empty(d.shape), np.empty((*d.shape, 3)), np.empty((*d.shape, 2))
     value[..., 0] = c * d[..., 0] + s * d[..., 1]
     value[..., 1] = c * d[..., 1] - s * d[..., 0]
-    J_landmark[..., 0, 0] = J_landmark[..., 1, 1] = c
+    J_landmark[..., 0, 0] = J_landmark[..., 1, 1] = c  # eq-jacobians-measurement
     J_landmark[..., 0, 1] = s
     J_landmark[..., 1, 0] = -s
     J_pose[..., :2] = -J_landmark
@@ -69,29 +71,31 @@ def vehicle_from_world_with_jacobians(pose: ArrayLike, landmark: ArrayLike) -> O
     return ObservationJacobians(value, J_pose, J_landmark)
 
 
-def world_from_vehicle(pose: ArrayLike, measurement: ArrayLike) -> Array:
+def world_from_vehicle(T_world_vehicle: ArrayLike, measurement: ArrayLike) -> Array:
     """World coordinates of a landmark measured in the vehicle frame.
 
     Implements :eq:`eq-b25` (B25), which is :eq:`eq-b23` (B23) composed as in :eq:`eq-b24` (B24).
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
+    T_world_vehicle : array_like, shape (..., 3)
         Vehicle pose in the world.
     measurement : array_like, shape (..., 2)
         Vehicle coordinates of the landmark, metres.
     """
-    return se2.act(pose, measurement)
+    return se2.act(T_world_vehicle, measurement)
 
 
-def world_from_vehicle_with_jacobians(pose: ArrayLike, measurement: ArrayLike) -> PlacementJacobians:
+def world_from_vehicle_with_jacobians(
+    T_world_vehicle: ArrayLike, measurement: ArrayLike
+) -> PlacementJacobians:
     """:func:`world_from_vehicle` and its Jacobians; same parameters."""
-    pose, z = np.asarray(pose, dtype=np.float64), np.asarray(measurement, dtype=np.float64)
+    pose, z = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(measurement, dtype=np.float64)
     J_z = np.broadcast_to(so2.exp(pose[..., 2]), (*np.broadcast_shapes(pose.shape[:-1], z.shape[:-1]), 2, 2))
     turned = np.einsum("...ij,...j->...i", J_z, z)
     value = turned + pose[..., :2]
     J_pose = np.zeros((*value.shape[:-1], 2, 3))
-    J_pose[..., 0, 0] = J_pose[..., 1, 1] = 1.0
+    J_pose[..., 0, 0] = J_pose[..., 1, 1] = 1.0  # eq-jacobians-new
     J_pose[..., 0, 2] = -turned[..., 1]
     J_pose[..., 1, 2] = turned[..., 0]
     return PlacementJacobians(value, J_pose, J_z)

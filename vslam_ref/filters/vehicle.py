@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry import so2
 
 
@@ -82,9 +82,9 @@ def ackermann_with_jacobians(control: ArrayLike, wheelbase: float, dt: float) ->
     u = np.asarray(control, dtype=np.float64)
     v, phi = u[..., 0], u[..., 1]
     tan = np.tan(phi)
-    value = np.stack([v * dt, v * dt * tan / wheelbase], -1)
+    value = np.stack([v * dt, v * dt * tan / wheelbase], -1)  # eq-increment
     J = np.zeros((*u.shape[:-1], 2, 2))
-    J[..., 0, 0] = dt
+    J[..., 0, 0] = dt  # eq-jacobian-drive
     J[..., 1, 0] = dt * tan / wheelbase
     J[..., 1, 1] = v * dt * (1.0 + tan * tan) / wheelbase
     return DriveJacobians(value, J)
@@ -92,6 +92,8 @@ def ackermann_with_jacobians(control: ArrayLike, wheelbase: float, dt: float) ->
 
 def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, dt: float) -> Increment:
     """Increment of noisy Ackermann controls, its covariance mapped to first order.
+
+    Implements :eq:`eq-increment` and :eq:`eq-jacobian-drive`.
 
     Parameters
     ----------
@@ -101,6 +103,11 @@ def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, 
         Covariance of the control noise, (m/s)^2 and rad^2.
     wheelbase, dt : float
         As in :func:`ackermann`.
+
+    Returns
+    -------
+    Increment
+        ds (m), dalpha (rad) and their covariance.
     """
     value, J = ackermann_with_jacobians(control, wheelbase, dt)
     cov = J @ np.asarray(cov_u, dtype=np.float64) @ np.swapaxes(J, -1, -2)
@@ -108,9 +115,22 @@ def ackermann_increment(control: ArrayLike, cov_u: ArrayLike, wheelbase: float, 
 
 
 def differential_increment(control: ArrayLike, cov_u: ArrayLike, dt: float) -> Increment:
-    """Increment of a differential drive: control (B, 2) = speed v (m/s) and turn rate omega (rad/s).
+    """Increment of a differential drive: ds = v dt and dalpha = omega dt.
 
-    ds = v dt and dalpha = omega dt, linear in the control: the covariance is dt^2 cov_u exactly.
+    Linear in the control, so that the covariance is dt^2 cov_u exactly.
+
+    Parameters
+    ----------
+    control : array_like, shape (B, 2)
+        Speed v (m/s) and turn rate omega (rad/s).
+    cov_u : array_like, shape (2, 2) or (B, 2, 2)
+        Covariance of the control noise, (m/s)^2 and (rad/s)^2.
+    dt : float
+        Duration, seconds.
+
+    Returns
+    -------
+    Increment
     """
     u = np.asarray(control, dtype=np.float64)
     cov = np.broadcast_to(np.asarray(cov_u, dtype=np.float64) * dt**2, (*u.shape[:-1], 2, 2))
@@ -125,44 +145,70 @@ class PropagateJacobians(NamedTuple):
     J_increment: Array
 
 
-def propagate(pose: ArrayLike, increment: ArrayLike) -> Array:
-    """Move a pose (x, y, theta) by (ds, dalpha): first along the old heading, then turn.
+def motion_model(T_world_vehicle: Array, ds: Array, dalpha: Array) -> PropagateJacobians:
+    """Move a pose by an increment, first along the old heading, then turn; with F and G.
+
+    Implements :eq:`eq-b4` (B4) and :eq:`eq-jacobians-motion`.  This is the package's one motion model:
+    worlds, :func:`propagate` and the filters all call it.  (Numba's twin of the EKF repeats it.)
+
+    Parameters
+    ----------
+    T_world_vehicle : ndarray, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
+    ds, dalpha : ndarray, shapes (...)
+        Distance along the heading, metres, and turn, radians.
+
+    Returns
+    -------
+    PropagateJacobians
+        The new pose, its angle in (-pi, pi]; ``J_pose`` is F, ``J_increment`` is G.
+    """
+    x, y, theta = T_world_vehicle[..., 0], T_world_vehicle[..., 1], T_world_vehicle[..., 2]
+    c, s = np.cos(theta), np.sin(theta)
+    ahead, left = ds * c, ds * s
+    shape = np.shape(x + ahead)
+    value, F, G = np.empty((*shape, 3)), np.zeros((*shape, 3, 3)), np.zeros((*shape, 3, 2))
+    value[..., 0] = x + ahead  # eq-b4
+    value[..., 1] = y + left
+    value[..., 2] = so2.wrap(theta + dalpha)
+    F[..., 0, 0] = F[..., 1, 1] = F[..., 2, 2] = 1.0  # eq-jacobians-motion
+    F[..., 0, 2], F[..., 1, 2] = -left, ahead
+    G[..., 0, 0], G[..., 1, 0], G[..., 2, 1] = c, s, 1.0
+    return PropagateJacobians(value, F, G)
+
+
+def propagate(T_world_vehicle: ArrayLike, increment: ArrayLike) -> Array:
+    """Move a pose by (ds, dalpha): first along the old heading, then turn.
 
     Implements :eq:`eq-b4` (B4) together with a drive.
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
-        World frame, metres and radians.
+    T_world_vehicle : array_like, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
     increment : array_like, shape (..., 2)
-        ds and dalpha.
+        ds (m) and dalpha (rad).
 
     Returns
     -------
     ndarray, shape (..., 3)
         The new pose, its angle in (-pi, pi].
+
+    Examples
+    --------
+    >>> propagate([1.0, 2.0, 0.0], [0.5, 0.25])
+    array([1.5 , 2.  , 0.25])
     """
-    return propagate_with_jacobians(pose, increment).value
+    return propagate_with_jacobians(T_world_vehicle, increment).value
 
 
-def propagate_with_jacobians(pose: ArrayLike, increment: ArrayLike) -> PropagateJacobians:
-    """:func:`propagate` and its Jacobians; same parameters."""
-    pose, inc = np.asarray(pose, dtype=np.float64), np.asarray(increment, dtype=np.float64)
-    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
-    ds, dalpha = inc[..., 0], inc[..., 1]
-    value = np.stack([pose[..., 0] + ds * c, pose[..., 1] + ds * s, so2.wrap(pose[..., 2] + dalpha)], -1)
-    J_pose = np.zeros((*value.shape[:-1], 3, 3))
-    J_pose[..., [0, 1, 2], [0, 1, 2]] = 1.0
-    J_pose[..., 0, 2] = -ds * s
-    J_pose[..., 1, 2] = ds * c
-    J_increment = np.zeros((*value.shape[:-1], 3, 2))
-    J_increment[..., 0, 0] = c
-    J_increment[..., 1, 0] = s
-    J_increment[..., 2, 1] = 1.0
-    return PropagateJacobians(value, J_pose, J_increment)
+def propagate_with_jacobians(T_world_vehicle: ArrayLike, increment: ArrayLike) -> PropagateJacobians:
+    """:func:`propagate` and its Jacobians F and G; same parameters."""
+    pose, inc = as_array("T_world_vehicle", T_world_vehicle, 3), as_array("increment", increment, 2)
+    return motion_model(pose, inc[..., 0], inc[..., 1])
 
 
-def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: float) -> Array:
+def front_wheel_step(T_world_vehicle: ArrayLike, control: ArrayLike, wheelbase: float, dt: float) -> Array:
     """Move a pose by the front-wheel model of Bailey's simulator, the alternative to B4.
 
     x += V dt cos(theta + G), y += V dt sin(theta + G), theta += V dt sin(G) / WB: the speed V is that
@@ -172,12 +218,12 @@ def front_wheel_step(pose: ArrayLike, control: ArrayLike, wheelbase: float, dt: 
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
+    T_world_vehicle : array_like, shape (..., 3)
         Pose of the front wheel's contact point, heading of the vehicle's axis.
     control : array_like, shape (..., 2)
         Front wheel speed V (m/s) and steering angle G (rad).
     """
-    pose, u = np.asarray(pose, dtype=np.float64), np.asarray(control, dtype=np.float64)
+    pose, u = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(control, dtype=np.float64)
     step, direction = u[..., 0] * dt, pose[..., 2] + u[..., 1]
     turn = step * np.sin(u[..., 1]) / wheelbase
     return np.stack(

@@ -37,6 +37,17 @@ def align_rigid(points: ArrayLike, reference: ArrayLike) -> Array:
 
 
 def root_mean_square(errors: ArrayLike) -> float:
-    """Root of the mean squared length of error vectors (N, d), or of numbers (N,)."""
+    """Root of the mean squared length.
+
+    Parameters
+    ----------
+    errors : array_like, shape (N, d) or (N,)
+        Error vectors, or numbers.
+
+    Returns
+    -------
+    float
+        In the unit of the errors.
+    """
     e = np.asarray(errors, dtype=np.float64)
     return float(np.sqrt(np.mean(np.sum(np.atleast_2d(e.T).T ** 2, -1))))

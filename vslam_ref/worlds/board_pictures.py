@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.calibration import Board, simulated
+from vslam_ref.estimation.calibration import Board
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
+from vslam_ref.worlds import boards
 
 DARK, BRIGHT = 30.0, 220.0
 """Grey values of black squares, and of all else."""
@@ -28,13 +29,13 @@ def take(
 ) -> BoardPictures:
     """Take pictures of a board in random poses, its ring of squares inside the image.
 
-    ``poses`` goes to :func:`simulated.poses`, for a board that has the ring's outer corners, too.
+    ``poses`` goes to :func:`boards.poses`, for a board that has the ring's outer corners, too.
     """
     ringed = Board(board.columns + 2, board.rows + 2, board.square)
     corner = se3.from_rt(
         np.eye(3), np.array([board.square, board.square, 0.0])
     )  # of the board in the ringed one
-    T = se3.compose(simulated.poses(ringed, camera, size, count, rng, **poses), corner)
+    T = se3.compose(boards.poses(ringed, camera, size, count, rng, **poses), corner)
     xn = normalised_samples(camera, size)
     return BoardPictures(np.stack([render(board, xn, one) for one in T]), T)
 

@@ -19,43 +19,36 @@ axle of 0.5 m; relative landmark positions; P0 = 0.  Nothing but the noises is r
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.filters import observation, vehicle
-from vslam_ref.worlds.vehicle_field import Sighting
-
-
-def _assume(default: Any, unit: str, reason: str) -> Any:
-    return field(default=default, metadata={"unit": unit, "reason": reason})
+from vslam_ref.filters import vehicle
+from vslam_ref.worlds.assumptions import assume, require
+from vslam_ref.worlds.vehicle_field import Sighting, seen_within
 
 
 @dataclass(frozen=True)
 class CircleConfig:
     """The published numbers of the circle."""
 
-    speed: float = _assume(0.25, "m/s", "published: 0.25 m/s")
-    turn_rate: float = _assume(float(np.deg2rad(1.5)), "rad/s", "published: 1.5 degrees a second")
-    dt: float = _assume(1.0, "s", "published: odometry at 1 Hz")
-    steps: int = _assume(2499, "", "published: 2500 times, the start included; some ten circles")
-    landmarks: int = _assume(20, "", "published: 20")
-    landmark_offset: float = _assume(3.0, "m", "public code: least range, 1 m, plus 2 m")
-    max_range: float = _assume(5.0, "m", "published: 5 m")
-    sigma_v: float = _assume(0.05 * 0.25 / np.sqrt(2), "m/s", "public code: 0.05 v / sqrt(2)")
-    sigma_omega: float = _assume(0.05 * 0.25 * 2 * np.sqrt(2), "rad/s", "public code: 0.05 v 2 sqrt(2)")
-    sigma_z: float = _assume(0.1, "m", "published: 0.1 m per coordinate")
+    speed: float = assume(0.25, "m/s", "published: 0.25 m/s")
+    turn_rate: float = assume(float(np.deg2rad(1.5)), "rad/s", "published: 1.5 degrees a second")
+    dt: float = assume(1.0, "s", "published: odometry at 1 Hz")
+    steps: int = assume(2499, "", "published: 2500 times, the start included; some ten circles")
+    landmarks: int = assume(20, "", "published: 20")
+    landmark_offset: float = assume(3.0, "m", "public code: least range, 1 m, plus 2 m")
+    max_range: float = assume(5.0, "m", "published: 5 m")
+    sigma_v: float = assume(0.05 * 0.25 / np.sqrt(2), "m/s", "public code: 0.05 v / sqrt(2)")
+    sigma_omega: float = assume(0.05 * 0.25 * 2 * np.sqrt(2), "rad/s", "public code: 0.05 v 2 sqrt(2)")
+    sigma_z: float = assume(0.1, "m", "published: 0.1 m per coordinate")
 
     def __post_init__(self) -> None:
         """Refuse values no world can be built from."""
-        for name in ("speed", "turn_rate", "dt", "steps", "landmarks", "max_range", "sigma_z"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be > 0")
-        for name in ("landmark_offset", "sigma_v", "sigma_omega"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be >= 0")
+        positive = ("speed", "turn_rate", "dt", "steps", "landmarks", "max_range", "sigma_z")
+        require(self, positive, ("landmark_offset", "sigma_v", "sigma_omega"))
 
     @property
     def radius(self) -> float:
@@ -69,11 +62,26 @@ class CircleConfig:
 
 
 class Circle(NamedTuple):
-    """Truth: times (T + 1,), poses (T + 1, 3), controls (T, 2) = (v, omega), landmarks (n, 2), sightings."""
+    """Truth of a course.
+
+    Attributes
+    ----------
+    config : CircleConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    controls : ndarray, shape (T, 2)
+        v (m/s) and omega (rad/s).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        What is seen when, without noise.
+    """
 
     config: CircleConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]
@@ -93,11 +101,6 @@ def make_circle(config: CircleConfig) -> Circle:
     angle = 2 * np.pi * np.arange(config.landmarks) / config.landmarks
     rho = config.radius + config.landmark_offset
     landmarks = np.stack([rho * np.cos(angle), config.radius + rho * np.sin(angle)], -1)
-    sightings = []
-    for k in range(1, config.steps + 1):
-        z = observation.vehicle_from_world(poses[k], landmarks)
-        ids = np.flatnonzero(np.hypot(z[:, 0], z[:, 1]) < config.max_range)
-        if len(ids):
-            sightings.append(Sighting(k, ids, z[ids]))
+    sightings = seen_within(config.max_range, range(1, config.steps + 1), poses, landmarks)
     times: Array = config.dt * np.arange(config.steps + 1, dtype=np.float64)
-    return Circle(config, times, poses, controls, landmarks, tuple(sightings))
+    return Circle(config, times, poses, controls, landmarks, sightings)

@@ -16,46 +16,40 @@ noise.  The true path and the landmarks are the same for all runs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import observation, vehicle
-
-
-def _assume(default: float, unit: str, reason: str) -> float:
-    return field(default=default, metadata={"unit": unit, "reason": reason})
+from vslam_ref.worlds.assumptions import assume, require
 
 
 @dataclass(frozen=True)
 class VehicleFieldConfig:
     """The declared assumptions of the simulated course; the paper gives side, laps and lap time only."""
 
-    side: float = _assume(20.0, "m", "B§4.1: a scene of 20 m x 20 m")
-    lap_seconds: float = _assume(80.0, "s", "B§4.1: each loop takes 80 s")
-    laps: int = field(default=2, metadata={"unit": "", "reason": "B§4.1: two loops"})
-    corner_radius: float = _assume(2.5, "m", "not given; an Ackermann vehicle cannot turn on the spot")
-    dt: float = _assume(0.1, "s", "not given; 800 steps a lap")
-    wheelbase: float = _assume(1.0, "m", "not given; steering stays at 22 degrees in the corners")
-    landmarks: int = field(default=30, metadata={"unit": "", "reason": "not given"})
-    landmark_half_width: float = _assume(12.0, "m", "not given; the scene and a rim of 2 m outside it")
-    measurement_period: float = _assume(1.0, "s", "not given")
-    max_range: float = _assume(6.0, "m", "not given; a few landmarks in view, none all the way")
-    sigma_v: float = _assume(0.2, "m/s", "not given; one fifth of the speed")
-    sigma_phi: float = _assume(float(np.deg2rad(3.0)), "rad", "not given; 3 degrees of steering")
-    sigma_z: float = _assume(0.1, "m", "not given; per coordinate of a relative measurement")
+    side: float = assume(20.0, "m", "B§4.1: a scene of 20 m x 20 m")
+    lap_seconds: float = assume(80.0, "s", "B§4.1: each loop takes 80 s")
+    laps: int = assume(2, "", "B§4.1: two loops")
+    corner_radius: float = assume(2.5, "m", "not given; an Ackermann vehicle cannot turn on the spot")
+    dt: float = assume(0.1, "s", "not given; 800 steps a lap")
+    wheelbase: float = assume(1.0, "m", "not given; steering stays at 22 degrees in the corners")
+    landmarks: int = assume(30, "", "not given")
+    landmark_half_width: float = assume(12.0, "m", "not given; the scene and a rim of 2 m outside it")
+    measurement_period: float = assume(1.0, "s", "not given")
+    max_range: float = assume(6.0, "m", "not given; a few landmarks in view, none all the way")
+    sigma_v: float = assume(0.2, "m/s", "not given; one fifth of the speed")
+    sigma_phi: float = assume(float(np.deg2rad(3.0)), "rad", "not given; 3 degrees of steering")
+    sigma_z: float = assume(0.1, "m", "not given; per coordinate of a relative measurement")
 
     def __post_init__(self) -> None:
         """Refuse values no world can be built from."""
         lengths = ("side", "corner_radius", "wheelbase", "landmark_half_width", "max_range", "sigma_z")
-        for name in (*lengths, "lap_seconds", "dt", "measurement_period", "laps", "landmarks"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be > 0")
-        for name in ("sigma_v", "sigma_phi"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be >= 0")
+        positive = (*lengths, "lap_seconds", "dt", "measurement_period", "laps", "landmarks")
+        require(self, positive, ("sigma_v", "sigma_phi"))
         if 2 * self.corner_radius > self.side:
             raise ValueError(f"corner_radius={self.corner_radius}: must be at most half the side {self.side}")
         if self.quarter_steps < 2:
@@ -96,11 +90,26 @@ class Sighting(NamedTuple):
 
 
 class VehicleField(NamedTuple):
-    """Truth of a course: times (T + 1,), poses (T + 1, 3), controls (T, 2), landmarks (n, 2), sightings."""
+    """Truth of a course.
+
+    Attributes
+    ----------
+    config : VehicleFieldConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    controls : ndarray, shape (T, 2)
+        Speed v (m/s) and steering angle phi (rad).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        What is seen when, without noise.
+    """
 
     config: VehicleFieldConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]
@@ -161,14 +170,23 @@ def make_field(config: VehicleFieldConfig, rng: np.random.Generator) -> VehicleF
     poses, controls = course(config)
     w = config.landmark_half_width
     landmarks: Array = rng.uniform(-w, w, (config.landmarks, 2))
+    looks = range(0, config.steps + 1, config.measurement_steps)
+    sightings = seen_within(config.max_range, looks, poses, landmarks)
+    times: Array = config.dt * np.arange(config.steps + 1, dtype=np.float64)
+    return VehicleField(config, times, poses, controls, landmarks, sightings)
+
+
+def seen_within(
+    max_range: float, steps: Iterable[int], T_world_vehicle: Array, landmarks: Array
+) -> tuple[Sighting, ...]:
+    """List which of the landmarks (n, 2) are seen when: within ``max_range`` metres, at the given steps."""
     sightings = []
-    for step in range(0, config.steps + 1, config.measurement_steps):
-        z = observation.vehicle_from_world(poses[step], landmarks)
-        ids = np.flatnonzero(np.hypot(z[:, 0], z[:, 1]) <= config.max_range)
+    for step in steps:
+        z = observation.vehicle_from_world(T_world_vehicle[step], landmarks)
+        ids = np.flatnonzero(np.hypot(z[:, 0], z[:, 1]) <= max_range)
         if len(ids):
             sightings.append(Sighting(step, ids, z[ids]))
-    times: Array = config.dt * np.arange(config.steps + 1, dtype=np.float64)
-    return VehicleField(config, times, poses, controls, landmarks, tuple(sightings))
+    return tuple(sightings)
 
 
 def draw_noise(world: Course, generators: list[np.random.Generator]) -> Noise:

@@ -20,8 +20,8 @@ loop of some 380 m with bends to both sides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,50 +29,46 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array
 from vslam_ref.filters import observation, vehicle
 from vslam_ref.geometry import so2
+from vslam_ref.worlds.assumptions import assume, require
 from vslam_ref.worlds.vehicle_field import Sighting
 
 MIN_RANGE = 1.0
 """Metres; nearer landmarks are not reported, as the conversion from range and bearing needs r >> sigma_R."""
 
 
-def _assume(default: Any, unit: str, reason: str) -> Any:
-    return field(default=default, metadata={"unit": unit, "reason": reason})
-
-
 @dataclass(frozen=True)
 class WaypointConfig:
     """Bailey's numbers, and the declared course."""
 
-    speed: float = _assume(3.0, "m/s", "Bailey: speed V of the front wheel")
-    max_steer: float = _assume(float(np.deg2rad(30.0)), "rad", "Bailey: 30 degrees")
-    steer_rate: float = _assume(float(np.deg2rad(20.0)), "rad/s", "Bailey: 20 degrees a second")
-    wheelbase: float = _assume(4.0, "m", "Bailey: 4 m")
-    dt: float = _assume(0.025, "s", "Bailey: 40 controls a second")
-    sighting_steps: int = _assume(8, "", "Bailey: a sighting every 8 controls")
-    max_range: float = _assume(30.0, "m", "Bailey: 30 m, in the half-plane ahead")
-    sigma_v: float = _assume(0.3, "m/s", "Bailey: 0.3 m/s")
-    sigma_g: float = _assume(float(np.deg2rad(3.0)), "rad", "Bailey: 3 degrees")
-    sigma_range: float = _assume(0.1, "m", "Bailey: 0.1 m")
-    sigma_bearing: float = _assume(float(np.deg2rad(1.0)), "rad", "Bailey: 1 degree")
-    near: float = _assume(1.0, "m", "Bailey: a waypoint is reached within 1 m")
-    loops: int = _assume(2, "", "Bailey: two rounds")
-    waypoints: tuple[float, ...] = _assume(
+    speed: float = assume(3.0, "m/s", "Bailey: speed V of the front wheel")
+    max_steer: float = assume(float(np.deg2rad(30.0)), "rad", "Bailey: 30 degrees")
+    steer_rate: float = assume(float(np.deg2rad(20.0)), "rad/s", "Bailey: 20 degrees a second")
+    wheelbase: float = assume(4.0, "m", "Bailey: 4 m")
+    dt: float = assume(0.025, "s", "Bailey: 40 controls a second")
+    sighting_steps: int = assume(8, "", "Bailey: a sighting every 8 controls")
+    max_range: float = assume(30.0, "m", "Bailey: 30 m, in the half-plane ahead")
+    sigma_v: float = assume(0.3, "m/s", "Bailey: 0.3 m/s")
+    sigma_g: float = assume(float(np.deg2rad(3.0)), "rad", "Bailey: 3 degrees")
+    sigma_range: float = assume(0.1, "m", "Bailey: 0.1 m")
+    sigma_bearing: float = assume(float(np.deg2rad(1.0)), "rad", "Bailey: 1 degree")
+    near: float = assume(1.0, "m", "Bailey: a waypoint is reached within 1 m")
+    loops: int = assume(2, "", "Bailey: two rounds")
+    waypoints: tuple[float, ...] = assume(
         (20, -2, 50, -6, 66, 14, 56, 38, 66, 62, 44, 78, 18, 64, -10, 76, -36, 62, -28, 34, -40, 10, -14, -4),
         "m",
         "not given as text; x, y of a loop of some 380 m, with bends to both sides",
     )
-    landmarks: int = _assume(35, "", "not given as text; one on every 11 m of the loop")
-    margin: float = _assume(15.0, "m", "not given; landmarks lie up to half the range outside the waypoints")
+    landmarks: int = assume(35, "", "not given as text; one on every 11 m of the loop")
+    margin: float = assume(15.0, "m", "not given; landmarks lie up to half the range outside the waypoints")
 
     def __post_init__(self) -> None:
         """Refuse values no course can be built from."""
         names = ("speed", "max_steer", "steer_rate", "wheelbase", "dt", "sighting_steps", "max_range")
-        for name in (*names, "sigma_range", "near", "loops", "landmarks", "margin"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be > 0")
-        for name in ("sigma_v", "sigma_g", "sigma_bearing"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must be >= 0")
+        require(
+            self,
+            (*names, "sigma_range", "near", "loops", "landmarks", "margin"),
+            ("sigma_v", "sigma_g", "sigma_bearing"),
+        )
         if len(self.waypoints) % 2 or len(self.waypoints) < 6:
             raise ValueError(
                 f"waypoints: need x, y of three points or more, got {len(self.waypoints)} numbers"
@@ -87,14 +83,26 @@ class WaypointConfig:
 
 
 class WaypointCourse(NamedTuple):
-    """Truth: times (T + 1,), poses (T + 1, 3) of the rear axle, controls (T, 2) = (V, G), landmarks (n, 2).
+    """Truth of a course.
 
-    ``sightings`` hold range and bearing (m, 2), metres and radians.
+    Attributes
+    ----------
+    config : WaypointConfig
+    times : ndarray, shape (T + 1,)
+        Seconds.
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta) of the rear axle, metres and radians.
+    controls : ndarray, shape (T, 2)
+        Front wheel speed V (m/s) and steering angle G (rad).
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres.
+    sightings : tuple of Sighting
+        Range and bearing (m, 2), metres and radians, without noise.
     """
 
     config: WaypointConfig
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     controls: Array
     landmarks: Array
     sightings: tuple[Sighting, ...]

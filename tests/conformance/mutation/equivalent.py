@@ -34,13 +34,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("geometry.sim3.left_jacobian", "J = one + A @ J / n", "factors exchanged"): COMMUTE,
     ("geometry.sim3.left_jacobian", "J = (J + adjoint(exp(part)) @ J) / 2", "factors exchanged"): COMMUTE,
     (
-        "filters.carleman_ekf.lifted.LiftedCarlemanEkf.predict",
-        "self._steps += 1",
-        "the sign of an addition in place",
-    ): "how many steps are gathered before they are used",
-    (
-        "filters.carleman_ekf.lifted.LiftedCarlemanEkf._augment",
-        "more = max(lift.LANDMARK, self._z.shape[1] - lift.VEHICLE)",
+        "filters.carleman_ekf.lifted.LiftedCarlemanEkf._append",
+        "more = (0, max(lift.LANDMARK, self._z.shape[1] - lift.VEHICLE))",
         "- to +",
     ): "how much room is made for later landmarks",
     (

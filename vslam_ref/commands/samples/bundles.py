@@ -12,7 +12,7 @@ from vslam_ref.commands.samples import Made
 from vslam_ref.datasets.bundle_files import BundleFile, write_bal, write_colmap
 from vslam_ref.estimation.bundle import BundleProblem, Observations, Scene
 from vslam_ref.geometry.cameras import Radtan, projection
-from vslam_ref.worlds.bundle_scene import make_bundle, moved_start
+from vslam_ref.worlds.bundles import make_bundle, moved_start
 
 SIGMA_PX = 0.5
 SEEN = 0.7

@@ -27,7 +27,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
-from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.metrics.consistency import nees_pose, nis, pose_error
 from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
@@ -161,7 +161,9 @@ def make_filter(name: str, mean: Array, cov: Array, config: StudyConfig, world: 
         return carleman_ekf(mean, cov, config.iekf_form, n, config.iekf_start, config.iekf_control)
     if name == "ekf-anchored":
         return AnchoredEkf(mean, cov, n)
-    return EkfSlam(mean, cov, n, Truth(world.poses, world.landmarks) if name == "ekf-ideal" else None)
+    if name == "ekf-ideal":
+        return IdealEkf(mean, cov, Truth(world.T_world_vehicle, world.landmarks), n)
+    return EkfSlam(mean, cov, n)
 
 
 def simulate(task: Task) -> RunArrays:
@@ -171,7 +173,7 @@ def simulate(task: Task) -> RunArrays:
     noise = run_noise(config, control, task.first, task.size)
     scale = config.control_scale if control else 1.0
     p0 = config.p0(task.p0) * scale**2
-    start = world.poses[0] + noise.start * np.sqrt(p0)
+    start = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
     slam = make_filter("ekf" if control else task.filter, start, np.diag(p0), config, world)
     return drive(slam, world, noise, scale)
 
@@ -206,8 +208,8 @@ def drive(slam: SlamFilter, world: VehicleField, noise: Noise, scale: float = 1.
                 value = nis(*innovation).value / innovation.innovation.shape[1]
                 innovations.append(value)
         mean[k], cov[k] = slam.pose()
-    error = pose_error(world.poses[:, None], mean)
-    square = nees_pose(np.broadcast_to(world.poses[:, None], mean.shape), mean, cov).value
+    error = pose_error(world.T_world_vehicle[:, None], mean)
+    square = nees_pose(np.broadcast_to(world.T_world_vehicle[:, None], mean.shape), mean, cov).value
     position = np.hypot(error[..., 0], error[..., 1])
     return RunArrays(square.T.copy(), position.T.copy(), error[..., 2].T.copy(), np.array(innovations).T)
 

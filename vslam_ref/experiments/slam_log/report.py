@@ -80,7 +80,7 @@ def _exact(truth: Truth | None) -> bool:
 def truth_path(truth: Truth) -> Array:
     """True positions (N, 2) with a row of NaN where the truth is interrupted."""
     gaps = np.flatnonzero(np.diff(truth.times) > truth.max_gap) + 1
-    return np.insert(truth.poses[:, :2], gaps, np.nan, axis=0)
+    return np.insert(truth.T_world_vehicle[:, :2], gaps, np.nan, axis=0)
 
 
 def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
@@ -91,7 +91,7 @@ def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
     R = so2.exp(T[2])
     empty = np.zeros((0, 3))
     lever = truth.lever if truth is not None else np.zeros(2)
-    at, _ = reference_point(run.poses, run.covs, lever)
+    at, _ = reference_point(run.T_run_vehicle, run.covs, lever)
     return Drawn(
         name=run.filter,
         path=se2.compose(T, at)[:, :2],
@@ -104,7 +104,7 @@ def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
 
 
 def _trajectory(run: LogRun) -> Array:
-    return np.column_stack([run.times, run.poses, np.sqrt(np.einsum("kii->ki", run.covs))])
+    return np.column_stack([run.times, run.T_run_vehicle, np.sqrt(np.einsum("kii->ki", run.covs))])
 
 
 def _map(run: LogRun) -> Array:

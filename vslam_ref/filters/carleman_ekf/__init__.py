@@ -4,12 +4,14 @@ The paper writes "IEKF" for *improved* EKF.  It is neither the invariant nor the
 
 The lift (``lift``) replaces the angle by its sine and cosine and adds their products with the
 positions, 11 vehicle states and 6 per landmark.  In these states the motion and the measurement are
-linear, given the control.  Two forms of the filter are offered; they share no code:
+linear, given the control.  Two forms of the filter are offered; they share no formula of the filter:
 
 * ``form="lifted"`` (``lifted``): the paper's matrices B16-B28 with the whole covariance of 11 + 6 n
   states; its errata can be run as printed (``lift.Variant``);
 * ``form="reduced"`` (``reduced``): the same pose estimates from 4 + 2 n states, an exact reduction;
   ``form="reduced-map"`` carries the map too, 4 + 4 n states.
+
+:mod:`.book` is both forms for one run in full matrices, to be read.
 """
 
 from __future__ import annotations

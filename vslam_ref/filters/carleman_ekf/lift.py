@@ -88,19 +88,44 @@ LANDMARK_MATRICES = _matrices(_LANDMARK_ROWS)
 LANDMARK_MATRICES_AS_PRINTED = _matrices((*_LANDMARK_ROWS[:5], _LANDMARK_ROW_6_AS_PRINTED))
 
 
-def lift_vehicle(pose: ArrayLike) -> Array:
-    """Lift poses (..., 3) to the 11 vehicle states (..., 11). Implements :eq:`eq-b14` (B14)."""
-    pose = np.asarray(pose, dtype=np.float64)
+def lift_vehicle(T_world_vehicle: ArrayLike) -> Array:
+    """Lift a pose to the 11 vehicle states.
+
+    Implements :eq:`eq-b14` (B14).
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 11)
+        z1 ... z11; metres where x or y is a factor, else without unit.
+    """
+    pose = np.asarray(T_world_vehicle, dtype=np.float64)
     x, y, s, c = pose[..., 0], pose[..., 1], np.sin(pose[..., 2]), np.cos(pose[..., 2])
     return np.stack([x, y, s, c, s * s, c * c, x * s, x * c, y * s, y * c, s * c], -1)
 
 
-def lift_vehicle_jacobian(pose: ArrayLike) -> Array:
-    """Jacobian (..., 11, 3) of :func:`lift_vehicle` in (x, y, theta)."""
-    pose = np.asarray(pose, dtype=np.float64)
+def lift_vehicle_jacobian(T_world_vehicle: ArrayLike) -> Array:
+    """Jacobian of :func:`lift_vehicle` in (x, y, theta).
+
+    Implements :eq:`eq-jacobian-lift`.
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 11, 3)
+    """
+    pose = np.asarray(T_world_vehicle, dtype=np.float64)
     x, y, s, c = pose[..., 0], pose[..., 1], np.sin(pose[..., 2]), np.cos(pose[..., 2])
     J = np.zeros((*pose.shape[:-1], VEHICLE, 3))
-    J[..., 0, 0] = J[..., 1, 1] = 1.0
+    J[..., 0, 0] = J[..., 1, 1] = 1.0  # eq-jacobian-lift
     J[..., 6, 0], J[..., 7, 0] = s, c
     J[..., 8, 1], J[..., 9, 1] = s, c
     slope = [c, -s, 2 * s * c, -2 * s * c, x * c, -x * s, y * c, -y * s, c * c - s * s]
@@ -108,29 +133,104 @@ def lift_vehicle_jacobian(pose: ArrayLike) -> Array:
     return J
 
 
-def lift_landmark(pose: ArrayLike, landmark: ArrayLike) -> Array:
-    """Lift landmarks (..., 2), seen from poses (..., 3), to (..., 6). Implements :eq:`eq-b15` (B15)."""
-    pose, landmark = np.asarray(pose, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
+def lift_landmark(T_world_vehicle: ArrayLike, landmark: ArrayLike) -> Array:
+    """Lift landmarks, seen from a pose, to their six states.
+
+    Implements :eq:`eq-b15` (B15).
+
+    Parameters
+    ----------
+    T_world_vehicle : array_like, shape (..., 3)
+        Pose (x, y, theta), world frame, metres and radians.
+    landmark : array_like, shape (..., 2)
+        World frame, metres.
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        x, y, and their products with sin and cos of the heading, metres.
+    """
+    pose, landmark = np.asarray(T_world_vehicle, dtype=np.float64), np.asarray(landmark, dtype=np.float64)
     x, y, theta = np.broadcast_arrays(landmark[..., 0], landmark[..., 1], pose[..., 2])
     s, c = np.sin(theta), np.cos(theta)
     return np.stack([x, y, s * x, c * x, s * y, c * y], -1)
 
 
 def vehicle_matrix(w: ArrayLike) -> Array:
-    """Matrix (..., 11, 11) of B16 for control monomials w (..., 9). Implements :eq:`eq-b16` (B16)."""
+    """Transition of the 11 vehicle states.
+
+    Implements :eq:`eq-b16` (B16).
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 9)
+        Control monomials, see :data:`MONOMIALS`.
+
+    Returns
+    -------
+    ndarray, shape (..., 11, 11)
+    """
     return np.tensordot(np.asarray(w, dtype=np.float64), VEHICLE_MATRICES, 1)
 
 
 def landmark_matrix(w: ArrayLike, variant: Variant = AS_CORRECTED) -> Array:
-    """Matrix (..., 6, 6) of B18 for control monomials w (..., 9). Implements :eq:`eq-b18` (B18)."""
+    """Transition of the six states of a landmark.
+
+    Implements :eq:`eq-b18` (B18).
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 9)
+        Control monomials, see :data:`MONOMIALS`.
+    variant : Variant
+        Whether the last row is as printed.
+
+    Returns
+    -------
+    ndarray, shape (..., 6, 6)
+    """
     matrices = LANDMARK_MATRICES_AS_PRINTED if variant.b18_as_printed else LANDMARK_MATRICES
     return np.tensordot(np.asarray(w, dtype=np.float64), matrices, 1)
 
 
+def control_jacobian(z: Array, variant: Variant = AS_CORRECTED) -> Array:
+    """Jacobian of the moved state in the control monomials, all but the constant one.
+
+    Implements :eq:`eq-jacobian-control-vehicle` and the Jacobians of :eq:`eq-b19` (B19), in monomials: the
+    motion is linear in them, so each column is one monomial's matrix times the lifted state.
+
+    Parameters
+    ----------
+    z : ndarray, shape (B, 11 + 6 n)
+        Lifted state.
+    variant : Variant
+        Whether the last row of B18 is as printed.
+
+    Returns
+    -------
+    ndarray, shape (B, 11 + 6 n, 8)
+    """
+    matrices = LANDMARK_MATRICES_AS_PRINTED if variant.b18_as_printed else LANDMARK_MATRICES
+    J_R = np.einsum("kij,bj->bik", VEHICLE_MATRICES[1:], z[:, :VEHICLE])
+    J_L = np.einsum("kij,bnj->bnik", matrices[1:], z[:, VEHICLE:].reshape(len(z), -1, LANDMARK))
+    return np.concatenate([J_R, J_L.reshape(len(z), -1, len(MONOMIALS) - 1)], 1)
+
+
 def measurement_matrix(slots: ArrayLike, landmarks: int) -> Array:
-    """Constant measurement matrix (2 m, 11 + 6 n) of the landmarks in map places ``slots`` (m,).
+    """Constant measurement matrix of landmarks of the map.
 
     Implements :eq:`eq-b22` (B22): a = zi4 + zi5 - z8 - z9, b = -zi3 + zi6 + z7 - z10.
+
+    Parameters
+    ----------
+    slots : array_like of int, shape (m,)
+        Places of the landmarks in the map.
+    landmarks : int
+        Landmarks n of the map.
+
+    Returns
+    -------
+    ndarray, shape (2 m, 11 + 6 n)
     """
     slots = np.asarray(slots, dtype=np.int64)
     H = np.zeros((len(slots), 2, VEHICLE + LANDMARK * landmarks))
@@ -147,7 +247,7 @@ def placement_matrices(
 ) -> tuple[Array, Array]:
     """Matrices of a new landmark: G_3 in the vehicle states and G_new in the measurement.
 
-    Implements :eq:`eq-b26` (B26) and the Jacobians of :eq:`eq-b28` (B28).
+    Implements :eq:`eq-b26` (B26) and :eq:`eq-jacobians-placement`, the blocks of :eq:`eq-b28` (B28).
 
     Parameters
     ----------

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.filters.carleman_ekf import lift
+from vslam_ref.filters.estimates import checked_moments
 from vslam_ref.filters.vehicle import Increment
 
 Term = tuple[complex, int, int, int]
@@ -62,7 +63,7 @@ def _mean_of(terms: tuple[Term, ...], mean: Array, cov: Array) -> Array:
     """E of a sum of terms of degree p + q <= 1 under N(mean (B, 3), cov (B, 3, 3)), shape (B,)."""
     total = np.zeros(len(mean), dtype=np.complex128)
     for coefficient, p, q, k in terms:
-        wave = np.exp(1j * k * mean[:, 2] - k * k * cov[:, 2, 2] / 2)
+        wave = np.exp(1j * k * mean[:, 2] - k * k * cov[:, 2, 2] / 2)  # eq-gaussian-moments
         total += coefficient * wave * _shifted(p, q, k, mean, cov)
     return total.real
 
@@ -109,16 +110,22 @@ def _gaussian_moments(
     return first, second
 
 
-def check_kind(name: str, kind: str) -> str:
-    """Return ``kind`` or raise a ValueError that names the choices."""
-    if kind not in ("first_order", "gaussian"):
-        raise ValueError(f"{name}={kind!r}: must be 'first_order' or 'gaussian'")
-    return kind
-
-
 def lifted_start(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
-    """Mean (B, 11) and covariance (B, 11, 11) of the lifted start pose N(mean (B, 3), cov (B, 3, 3))."""
-    if check_kind("start", kind) == "gaussian":
+    """Mean and covariance of the lifted start pose.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (B, 3)
+        Start pose (x, y, theta), world frame, metres and radians.
+    cov : ndarray, shape (B, 3, 3)
+        Its covariance.
+    kind : {"first_order", "gaussian"}
+
+    Returns
+    -------
+    mean, cov : ndarray, shapes (B, 11), (B, 11, 11)
+    """
+    if checked_moments("start", kind) == "gaussian":
         return _gaussian_moments(_LIFTED_VEHICLE, mean, cov)
     J = lift.lift_vehicle_jacobian(mean)
     return lift.lift_vehicle(mean), J @ cov @ J.swapaxes(1, 2)
@@ -132,7 +139,18 @@ class ControlMoments(NamedTuple):
 
 
 def control_monomials(U: Array) -> Array:
-    """The nine monomials w (..., 9) of U = (u1, u2, u3) (..., 3)."""
+    """Monomials of a control.
+
+    Parameters
+    ----------
+    U : ndarray, shape (..., 3)
+        u1 = ds (m), u2 = sin(dalpha), u3 = cos(dalpha).
+
+    Returns
+    -------
+    ndarray, shape (..., 9)
+        In the order of :data:`.lift.MONOMIALS`.
+    """
     u1, u2, u3 = U[..., 0], U[..., 1], U[..., 2]
     return np.stack([np.ones_like(u1), u1, u2, u3, u2 * u2, u2 * u3, u3 * u3, u1 * u2, u1 * u3], -1)
 
@@ -151,7 +169,7 @@ def control_moments(increment: Increment, kind: str, product_of_means: bool = Fa
         With ``gaussian`` only: put products of E[u] into the quadratic monomials.  Wrong: the mean of
         (sin, cos) is shorter than 1, and its square loses z5 + z6 step by step.
     """
-    if check_kind("control", kind) == "first_order":
+    if checked_moments("control", kind) == "first_order":
         return _first_order(increment)
     mean = np.stack([increment.ds, np.zeros_like(increment.ds), increment.dalpha], -1)
     cov = np.zeros((len(mean), 3, 3))
@@ -169,7 +187,7 @@ def _first_order(increment: Increment) -> ControlMoments:
     zero, one = np.zeros_like(ds), np.ones_like(ds)
     along = np.stack([one, zero, zero, zero, zero, zero, s, c], -1)
     turn = np.stack([zero, c, -s, 2 * s * c, c * c - s * s, -2 * s * c, ds * c, -ds * s], -1)
-    factor = np.stack([along, turn], -1) @ _factor_2x2(increment.cov)
+    factor = np.stack([along, turn], -1) @ _factor_2x2(increment.cov)  # eq-noise-first-order
     return ControlMoments(control_monomials(np.stack([ds, s, c], -1)), factor)
 
 

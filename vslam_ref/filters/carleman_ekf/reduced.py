@@ -22,38 +22,36 @@ measurement arrives or the pose is asked for: what they do is a handful of sums 
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, IntArray
-from vslam_ref.filters.block_covariance import Blocks
+from vslam_ref.arrays import Array, IntArray, transpose
+from vslam_ref.filters.block_covariance import Blocks, diagonal_blocks
 from vslam_ref.filters.carleman_ekf.reduced_moments import control_gaussian, start_moments
 from vslam_ref.filters.carleman_ekf.reduced_step import (
     as_matrix,
-    reduced_apply,
-    reduced_predict,
-    reduced_predict_first_order,
-    reduced_update,
+    reduced_apply_in_place,
+    reduced_expected,
+    reduced_predict_first_order_in_place,
+    reduced_predict_in_place,
+    reduced_update_in_place,
 )
 from vslam_ref.filters.estimates import (
     Innovation,
     MapEstimate,
     PoseEstimate,
+    SlamFilter,
     as_batch,
-    checked_measurement,
-    diagonal_blocks,
-    room_for_innovation,
+    checked_moments,
+    heading_vector_pose,
 )
 from vslam_ref.filters.vehicle import Increment
 
 WAITING = 16
 """Increments put down before they are used at the latest."""
-_CONTROL = ("first_order", "gaussian")
 
 
-class ReducedCarlemanEkf:
+class ReducedCarlemanEkf(SlamFilter):
     """Seed B's improved EKF in reduced states, for a batch of runs.
 
     Parameters
@@ -77,34 +75,45 @@ class ReducedCarlemanEkf:
         control: str = "first_order",
         with_map: bool = False,
     ) -> None:
-        if control not in _CONTROL:
-            raise ValueError(f"control={control!r}: must be one of {', '.join(_CONTROL)}")
-        x, P = start_moments(*as_batch(mean, cov), start)
-        self._first_order = control == "first_order"
+        x, P = start_moments(*as_batch(mean, cov), checked_moments("start", start))
+        self._first_order = checked_moments("control", control) == "first_order"
         self.with_map = with_map
         self._blocks = Blocks(x, P, landmark_states=4 if with_map else 2, capacity=capacity)
         self._frame = np.tile(np.array([1.0, 0.0, 0.0, 1.0], dtype=np.complex128), (len(x), 1))
         self._P_a = np.zeros((len(x), 8, 8))
         self._P_a[:, :4, :4] = P
-        self._blocks.P_pp = self._P_a[:, :4, :4]
         sizes = (len(x), WAITING)
         self._waiting = Increment(np.empty(sizes), np.empty(sizes), np.empty((*sizes, 2, 2)))
         self._waits = 0
-
-    def __deepcopy__(self, memo: dict[int, object]) -> ReducedCarlemanEkf:
-        """Copy the arrays, and let the copy's pose covariance be a part of its own augmented one."""
-        twin = copy.copy(self)
-        twin._blocks = copy.deepcopy(self._blocks)
-        twin._frame, twin._P_a = self._frame.copy(), self._P_a.copy()
-        twin._blocks.P_pp = twin._P_a[:, :4, :4]
-        twin._waiting = Increment(*(part.copy() for part in self._waiting))
-        return twin
+        self.runs = len(x)
+        self._noisy = False  # whether P_a holds noise that the map has not had yet
 
     @property
     def blocks(self) -> Blocks:
         """Mean and covariance; all increments so far are in the pose's blocks."""
         self._settle()
+        state = self._blocks.state
+        if state.P_pp.base is not self._P_a:  # after an append, and in a copy
+            self._blocks.state = state._replace(P_pp=self._P_a[:, :4, :4])
         return self._blocks
+
+    def state(self) -> tuple[Array, Array]:
+        """Mean (B, 4 + 2 n) and covariance of (x, y, sin, cos, r_1, ..., r_n), copies.
+
+        Implements :eq:`eq-reduction-map`: r_i = c rho_i - tau is the landmark in the vehicle frame.
+        """
+        b, (c, tau) = self._applied(), self._frame.T[:2]
+        mean, cov = b.full()
+        own = np.arange(4 + b.b * b.n)
+        kept = own[(own < 4) | ((own - 4) % b.b < 2)]  # without the map's world coordinates
+        mean, cov = mean[:, kept], cov[:, kept[:, None], kept]
+        turn = np.tile(np.eye(len(kept)), (len(mean), 1, 1))
+        for at in range(4, len(kept), 2):
+            turn[:, at : at + 2, at : at + 2] = as_matrix(c)
+        mean = (turn @ mean[:, :, None])[:, :, 0]
+        mean[:, 4::2] -= tau.real[:, None]
+        mean[:, 5::2] -= tau.imag[:, None]
+        return mean, turn @ cov @ transpose(turn)
 
     def predict(self, increment: Increment) -> None:
         """Move by an increment, in O(1). The reduced :eq:`eq-b16` (B16) and B18."""
@@ -119,76 +128,56 @@ class ReducedCarlemanEkf:
         k, self._waits = self._waits, 0
         if k == 0:
             return
+        self._noisy = True
         ds, dalpha, cov = (part[:, :k] for part in self._waiting)
         state = self._blocks.x_p, self._P_a, self._frame
         if self._first_order:
-            reduced_predict_first_order(*state, ds, dalpha, cov)
+            reduced_predict_first_order_in_place(*state, ds, dalpha, cov)
         else:
             mean, noise = control_gaussian(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
-            reduced_predict(*state, mean.reshape(-1, k, 5), noise.reshape(-1, k, 5, 5))
+            reduced_predict_in_place(*state, mean.reshape(-1, k, 5), noise.reshape(-1, k, 5, 5))
 
-    def _apply(self) -> None:
+    def _applied(self) -> Blocks:
+        """Mean and covariance; all increments so far are in the map's blocks, too."""
         b = self.blocks
-        reduced_apply(b.x_m, b.P_pm, b.P_mm, b.b, self._P_a, self._frame)
+        if self._noisy:
+            reduced_apply_in_place(b.state, b.b, self._P_a, self._frame)
+            self._noisy = False
+        return b
 
-    def update(self, ids: ArrayLike, z: ArrayLike, cov_z: ArrayLike) -> Innovation | None:
-        """Update with landmarks of the map, then add the new ones; as :meth:`EkfSlam.update`."""
-        ids, z, cov_z = checked_measurement(ids, z, cov_z, len(self._blocks.x_p))
-        columns = self.blocks.columns(ids)
-        known = columns >= 0
-        if len(ids) and known.all():
-            return self._update_known(columns, z, cov_z)
-        seen = None
-        if known.any():
-            seen = self._update_known(columns[known], z[:, known], cov_z[known])
-        else:
-            self._apply()
-        if len(ids):
-            self._augment(ids[~known], z[:, ~known], cov_z[~known])
-        return seen
+    def _columns(self, ids: IntArray) -> IntArray:
+        return self._blocks.columns(ids)
 
-    def _update_known(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
-        """Use z = c rho - tau + noise: the reduced :eq:`eq-b22` (B22)."""
-        b, seen = self.blocks, room_for_innovation(z)
-        state = b.x_p, b.x_m, b.P_pm, b.P_mm, b.b, self._P_a, self._frame
-        reduced_update(*state, columns, z, cov_z, *seen)
-        return seen
+    def _innovation(self, columns: IntArray, z: Array, cov_z: Array) -> Innovation:
+        seen = reduced_expected(self._applied().state, self._frame, columns, z, cov_z)
+        return Innovation(seen.innovation, seen.S)
+
+    def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
+        b, self._noisy = self.blocks, False
+        noise = b.b, self._P_a, self._frame
+        return Innovation(*reduced_update_in_place(b.state, *noise, columns, z, cov_z, gate))
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """r_new = z, uncorrelated with everything; its world place p + h z, when carried, is not."""
-        b = self.blocks
-        B, m = z.shape[:2]
+        b = self._applied()
+        (B, m, _), (x, y, sin, cos) = z.shape, b.x_p.T[:, :, None]
         c, tau = self._frame[:, 0:1], self._frame[:, 1:2]
-        zc = z[..., 0] + 1j * z[..., 1]
-        rho = (zc + tau) / c
-        mean, J_z = np.zeros((B, m, b.b)), np.zeros((B, m, b.b, 2))
-        mean[..., 0], mean[..., 1] = rho.real, rho.imag
-        J_z[:, :, :2] = as_matrix(1 / c)
-        J_pose = np.zeros((B, m, b.b, 4))
-        if self.with_map:
-            h = b.x_p[:, 3:4] + 1j * b.x_p[:, 2:3]
-            place = b.x_p[:, 0:1] + 1j * b.x_p[:, 1:2] + h * zc
-            mean[..., 2], mean[..., 3] = place.real, place.imag
-            J_z[:, :, 2:] = as_matrix(h)
-            J_pose[:, :, 2, 0] = J_pose[:, :, 3, 1] = 1.0
-            J_pose[:, :, 2, 2], J_pose[:, :, 2, 3] = -z[..., 1], z[..., 0]
-            J_pose[:, :, 3, 2], J_pose[:, :, 3, 3] = z[..., 0], z[..., 1]
-        G = J_pose.reshape(B, m * b.b, 4)
-        cov = G @ b.P_pp @ G.swapaxes(1, 2)
-        noise = J_z @ cov_z @ J_z.swapaxes(2, 3)
-        for j in range(m):
-            cov[:, b.b * j : b.b * (j + 1), b.b * j : b.b * (j + 1)] += noise[:, j]
-        cross_map = b.P_pm.swapaxes(1, 2) @ G.swapaxes(1, 2)
-        b.append(ids, mean.reshape(B, -1), cov, b.P_pp @ G.swapaxes(1, 2), cross_map)
+        zc, h = z[..., 0] + 1j * z[..., 1], cos + 1j * sin
+        rho, place = (zc + tau) / c, x + 1j * y + h * zc  # eq-complex-filter: r_new = z
+        mean = np.stack([rho.real, rho.imag, place.real, place.imag], -1)
+        G, J_z = np.zeros((B, m, 4, 4)), np.zeros((B, m, 4, 2))
+        J_z[:, :, :2], J_z[:, :, 2:] = as_matrix(1 / c), as_matrix(h)
+        G[:, :, 2, 0] = G[:, :, 3, 1] = 1.0
+        G[:, :, 2, 2], G[:, :, 2, 3] = -z[..., 1], z[..., 0]
+        G[:, :, 3, 2], G[:, :, 3, 3] = z[..., 0], z[..., 1]
+        kept = b.b  # without the map, the first two of four states
+        noise = J_z[:, :, :kept] @ cov_z @ transpose(J_z[:, :, :kept])
+        b.append(ids, mean[..., :kept].reshape(B, -1), G[:, :, :kept].reshape(B, m * kept, 4), noise)
 
     def pose(self) -> PoseEstimate:
         """(x, y, atan2(sin, cos)) as in B§4.1, and its covariance to first order."""
-        x, y, s, c = self.blocks.x_p.T
-        J = np.zeros((len(x), 3, 4))
-        J[:, 0, 0] = J[:, 1, 1] = 1.0
-        J[:, 2, 2], J[:, 2, 3] = c / (s * s + c * c), -s / (s * s + c * c)
-        cov = J @ self.blocks.P_pp @ J.swapaxes(1, 2)
-        return PoseEstimate(np.stack([x, y, np.arctan2(s, c)], -1), cov)
+        b = self.blocks
+        return heading_vector_pose(b.x_p, b.P_pp)
 
     def landmarks(self) -> MapEstimate:
         """The map in the world frame; needs ``with_map=True``.
@@ -200,7 +189,6 @@ class ReducedCarlemanEkf:
         """
         if not self.with_map:
             raise ValueError("this filter carries no map: build it with with_map=True (form='reduced-map')")
-        self._apply()
-        b = self.blocks
+        b = self._applied()
         mean = b.x_m.reshape(len(b.x_p), -1, 4)[:, :, 2:].copy()
-        return MapEstimate(b.ids, mean, diagonal_blocks(b.P_mm, 4, 4)[:, :, 2:, 2:])
+        return MapEstimate(b.ids, mean, diagonal_blocks(b.P_mm, 4)[:, :, 2:, 2:].copy())

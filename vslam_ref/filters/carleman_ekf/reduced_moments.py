@@ -15,11 +15,23 @@ Complex = NDArray[np.complex128]
 
 
 def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
-    """Mean (B, 4) and covariance (B, 4, 4) of (x, y, sin, cos) for a pose N(mean (B, 3), cov (B, 3, 3)).
+    """Mean and covariance of (x, y, sin, cos) of a Gaussian start pose.
 
     Implements :eq:`eq-b5` (B5) and its covariance.  ``first_order``: by the Jacobian.  ``gaussian``: with v
     the heading's variance and k the covariance of position and heading, E[h] = e^{i theta - v/2},
     cov(position, h) = i k E[h], E[h h] = e^{2i theta - 2v}.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (B, 3)
+        Start pose (x, y, theta), world frame, metres and radians.
+    cov : ndarray, shape (B, 3, 3)
+        Its covariance.
+    kind : {"first_order", "gaussian"}
+
+    Returns
+    -------
+    mean, cov : ndarray, shapes (B, 4), (B, 4, 4)
     """
     x, y, theta = mean.T
     s, c = np.sin(theta), np.cos(theta)
@@ -28,8 +40,6 @@ def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
         J[:, 0, 0] = J[:, 1, 1] = 1.0
         J[:, 2, 2], J[:, 3, 2] = c, -s
         return np.stack([x, y, s, c], -1), J @ cov @ J.swapaxes(1, 2)
-    if kind != "gaussian":
-        raise ValueError(f"start={kind!r}: must be 'first_order' or 'gaussian'")
     v = cov[:, 2, 2]
     shrink = np.exp(-v / 2)
     P = np.zeros((len(mean), 4, 4))
@@ -45,9 +55,18 @@ def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
 
 
 def control_first_order(increment: Increment) -> tuple[Array, Array]:
-    """Mean (B, 5) and covariance (B, 5, 5) of (ds, Re m, Im m, Re t, Im t), to first order.
+    """Moments of (ds, Re m, Im m, Re t, Im t), m = exp(-i dalpha) and t = ds m, to first order.
 
-    dm = -i m dalpha and dt = m dds - i t dalpha.
+    Implements :eq:`eq-noise-first-order`: dm = -i m dalpha and dt = m dds - i t dalpha.
+
+    Parameters
+    ----------
+    increment : Increment
+        ds (m) and dalpha (rad) of B runs, and their covariance.
+
+    Returns
+    -------
+    mean, cov : ndarray, shapes (B, 5), (B, 5, 5)
     """
     m = np.exp(-1j * increment.dalpha)
     t = increment.ds * m
@@ -55,7 +74,7 @@ def control_first_order(increment: Increment) -> tuple[Array, Array]:
     mean[:, 0], mean[:, 1], mean[:, 2], mean[:, 3], mean[:, 4] = increment.ds, m.real, m.imag, t.real, t.imag
     J[:, 0, 0], J[:, 3:, 0] = 1.0, mean[:, 1:3]
     J[:, 1::2, 1], J[:, 2::2, 1] = mean[:, 2::2], -mean[:, 1::2]
-    return mean, J @ increment.cov @ J.swapaxes(1, 2)
+    return mean, J @ increment.cov @ J.swapaxes(1, 2)  # eq-noise-first-order
 
 
 def control_gaussian(increment: Increment) -> tuple[Array, Array]:
@@ -66,7 +85,7 @@ def control_gaussian(increment: Increment) -> tuple[Array, Array]:
     like are divided out, so that no difference of nearly equal numbers is left.
     """
     d, s2, k, v = increment.ds, increment.cov[:, 0, 0], increment.cov[:, 0, 1], increment.cov[:, 1, 1]
-    m = np.exp(-1j * increment.dalpha - v / 2)
+    m = np.exp(-1j * increment.dalpha - v / 2)  # eq-gaussian-moments
     t = (d - 1j * k) * m
     less, keep = np.expm1(-v), np.exp(-v)
     plain_mm, conj_mm = less, -less

@@ -9,10 +9,10 @@
 
     reduced_predict   k controls at once: x_p, P_a and frame; no landmark is touched        O(k)
     reduced_apply     what waits goes into the map: P_pm <- Phi P_pm + N_pg E, P_mm += E^T N_gg E
-    reduced_update    the same and a measurement, in one pass over P_mm                     O(m n^2)
+    reduced_update    the same, then a measurement                                          O(m n^2)
 
-All functions work in place on a batch of B runs.  The formulas are those at the head of
-:mod:`vslam_ref.filters.carleman_ekf.reduced`, which keeps the books.
+These work in place on a batch of B runs, as their names say.  The formulas are those at the head of
+:mod:`vslam_ref.filters.carleman_ekf.reduced`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
-from vslam_ref.arrays import Array, IntArray
-from vslam_ref.filters.block_covariance import landmark_blocks, map_columns, move_means, whitened
+from vslam_ref.arrays import Array, IntArray, transpose
+from vslam_ref.filters.block_covariance import (
+    Expected,
+    State,
+    diagonal_blocks,
+    kalman_update_in_place,
+    map_columns,
+)
 from vslam_ref.filters.carleman_ekf.reduced_moments import control_first_order
 from vslam_ref.filters.vehicle import Increment
 
@@ -33,10 +39,11 @@ _I = np.array([-1j, 1j, 1j, 1j])
 
 
 def _predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
-    """K controls from their moments; see :func:`reduced_predict`."""
+    """K controls from their moments; see :func:`reduced_predict_in_place`."""
     ds, m, t = control[..., 0], control[..., 1] + 1j * control[..., 2], control[..., 3] + 1j * control[..., 4]
     h = x_p[:, 3:] + 1j * x_p[:, 2:3]
     # after control j: c = turned c_0, tau_j = m_j tau_{j-1} + t_j, h_j = e h_0, p_j = p_0 + D h_0
+    # eq-complex-filter, eq-reduced-filter: all controls at once
     turned = m.cumprod(1)
     c, tau = turned * frame[:, :1], turned * (frame[:, 1:2] + (t / turned).cumsum(1))
     e = turned.conj()
@@ -73,8 +80,8 @@ def _transition(D: Complex, e: Complex) -> Array:
     return phi
 
 
-@accelerated("reduced:reduced_predict")
-def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
+@accelerated("reduced:reduced_predict_in_place")
+def reduced_predict_in_place(x_p: Array, P_a: Array, frame: Complex, control: Array, cov: Array) -> None:
     """Predict k controls, one after the other, without touching a landmark.
 
     Implements :eq:`eq-b7`, :eq:`eq-b8`, :eq:`eq-b9`, :eq:`eq-b10` and :eq:`eq-b11` (B7-B11), chained: A is
@@ -95,11 +102,14 @@ def reduced_predict(x_p: Array, P_a: Array, frame: Complex, control: Array, cov:
     _predict(x_p, P_a, frame, control, cov)
 
 
-@accelerated("reduced:reduced_predict_first_order")
-def reduced_predict_first_order(
+@accelerated("reduced:reduced_predict_first_order_in_place")
+def reduced_predict_first_order_in_place(
     x_p: Array, P_a: Array, frame: Complex, ds: Array, dalpha: Array, cov: Array
 ) -> None:
-    """:func:`reduced_predict` with first-order moments of increments ds, dalpha (B, k), cov (B, k, 2, 2)."""
+    """:func:`reduced_predict_in_place` with first-order moments of increments.
+
+    ``ds``, ``dalpha`` (B, k) and ``cov`` (B, k, 2, 2) are those of k increments, one after the other.
+    """
     mean, noise = control_first_order(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
     _predict(x_p, P_a, frame, mean.reshape(*ds.shape, 5), noise.reshape(*ds.shape, 5, 5))
 
@@ -113,82 +123,92 @@ def _noise_rows(x_m: Array, b: int) -> Array:
     return E
 
 
-def _forget(P_a: Array, frame: Complex) -> None:
-    """Nothing waits any more."""
+def _apply(state: State, b: int, P_a: Array, frame: Complex) -> None:
+    """Body of :func:`reduced_apply_in_place`."""
+    E, N_gg = _noise_rows(state.x_m, b), P_a[:, 4:, 4:].copy()
+    state.P_pm[:] = _transition(frame[:, 2], frame[:, 3]) @ state.P_pm + P_a[:, :4, 4:] @ E  # eq-lazy-noise
+    state.P_mm[:] += transpose(E) @ (N_gg @ E)
     P_a[:, 4:, :] = 0.0
     P_a[:, :, 4:] = 0.0
     frame[:, 2], frame[:, 3] = 0.0, 1.0
 
 
-@accelerated("reduced:reduced_apply")
-def reduced_apply(x_m: Array, P_pm: Array, P_mm: Array, b: int, P_a: Array, frame: Complex) -> None:
-    """Apply the accumulated transition and noise to the map blocks, in place, and start afresh.
+@accelerated("reduced:reduced_apply_in_place")
+def reduced_apply_in_place(state: State, b: int, P_a: Array, frame: Complex) -> None:
+    """Apply the accumulated transition and noise to the map blocks, and begin to accumulate afresh.
 
-    P_pm <- Phi P_pm + N_pg E and P_mm <- P_mm + E^T N_gg E, where Phi is the pose transition of D and e, and
-    N_pg and N_gg are blocks of P_a.  Each landmark has ``b`` map states, rho first.
+    Implements :eq:`eq-lazy-noise`: P_pm <- Phi P_pm + N_pg E and P_mm <- P_mm + E^T N_gg E, where Phi is the
+    pose transition of D and e, and N_pg and N_gg are blocks of P_a.
+
+    Parameters
+    ----------
+    state : State
+        ``P_pm`` and ``P_mm`` are changed in place.
+    b : int
+        States per landmark, rho first.
+    P_a, frame : ndarray
+        As for :func:`reduced_predict_in_place`; changed in place.
     """
-    E = _noise_rows(x_m, b)
-    P_pm[:] = _transition(frame[:, 2], frame[:, 3]) @ P_pm + P_a[:, :4, 4:] @ E
-    P_mm += E.swapaxes(1, 2) @ (P_a[:, 4:, 4:] @ E)
-    _forget(P_a, frame)
+    _apply(state, b, P_a, frame)
 
 
-@accelerated("reduced:reduced_update")
-def reduced_update(
-    x_p: Array,
-    x_m: Array,
-    P_pm: Array,
-    P_mm: Array,
+@accelerated("reduced:reduced_update_in_place")
+def reduced_update_in_place(
+    state: State,
     b: int,
     P_a: Array,
     frame: Complex,
     columns: IntArray,
     z: Array,
     cov_z: Array,
-    innovation: Array,
-    S: Array,
-) -> None:
-    """:func:`reduced_apply`, and use z = c rho - tau + noise of m landmarks, in place.
+    gate: float,
+) -> tuple[Array, Array]:
+    """:func:`reduced_apply_in_place`, then use z = c rho - tau + noise of m landmarks.
 
-    Implements the reduced :eq:`eq-b22` (B22).  H is the real matrix of c at each landmark seen, and zero
-    elsewhere.  The noise that waits and the gain change P_mm in one product: P_mm += E^T (N_gg E) - W^T W.
+    Implements the reduced :eq:`eq-b22` (B22) and :eq:`eq-gain`.
 
     Parameters
     ----------
-    x_p, x_m, P_pm, P_mm, b, P_a, frame
-        As above; changed in place.
+    state : State
+        Changed in place, but for ``P_pp``: the pose's covariance is the first block of ``P_a``.
+    b, P_a, frame
+        As for :func:`reduced_apply_in_place`; changed in place.
     columns : ndarray of int, shape (m,)
         First map column of each landmark seen.
     z : ndarray, shape (B, m, 2)
-        Relative Cartesian measurements, metres.
+        Relative Cartesian measurements, metres, vehicle frame.
     cov_z : ndarray, shape (m, 2, 2)
-        Their covariances.
-    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
-        Room for measured - predicted and its covariance; filled.
-    """
-    B, m, _ = z.shape
-    pairs = map_columns(columns)
-    E = _noise_rows(x_m, b)
-    NE = P_a[:, 4:, 4:] @ E
-    P_pm[:] = _transition(frame[:, 2], frame[:, 3]) @ P_pm + P_a[:, :4, 4:] @ E
-    c, tau = frame[:, :1], frame[:, 1:2]
-    predicted = c * (x_m[:, columns] + 1j * x_m[:, columns + 1]) - tau
-    innovation[:, 0::2], innovation[:, 1::2] = z[..., 0] - predicted.real, z[..., 1] - predicted.imag
+        Their covariances, m^2.
+    gate : float
+        Runs whose normalised innovation squared is larger do not use the measurement.
 
-    turn = as_matrix(c)  # (B, 1, 2, 2)
-    rows = np.empty((B, 2 * m, 4 + x_m.shape[1]))
-    rows[:, :, :4] = P_pm.take(pairs, 2).swapaxes(1, 2)
-    rows[:, :, 4:] = P_mm.take(pairs, 1) + E.take(pairs, 2).swapaxes(1, 2) @ NE
-    HP = (turn @ rows.reshape(B, m, 2, -1)).reshape(rows.shape)
-    S[...] = (HP.take(4 + pairs, 2).reshape(B, -1, m, 2) @ turn.swapaxes(2, 3)).reshape(S.shape)
-    landmark_blocks(S)[...] += cov_z
-    W, y = whitened(HP, innovation, S)
-    move_means(x_p, x_m, W, y)
-    W_p, W_m = W[:, :, :4], W[:, :, 4:]
-    P_a[:, :4, :4] -= W_p.swapaxes(1, 2) @ W_p
-    P_pm -= W_p.swapaxes(1, 2) @ W_m
-    P_mm += np.concatenate([E, W_m], 1).swapaxes(1, 2) @ np.concatenate([NE, -W_m], 1)
-    _forget(P_a, frame)
+    Returns
+    -------
+    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
+        measured - predicted, and its covariance.
+    """
+    _apply(state, b, P_a, frame)
+    seen = reduced_expected(state, frame, columns, z, cov_z)
+    kalman_update_in_place(state._replace(P_pp=P_a[:, :4, :4]), seen, gate)
+    return seen.innovation, seen.S
+
+
+def reduced_expected(state: State, frame: Complex, columns: IntArray, z: Array, cov_z: Array) -> Expected:
+    """Innovation, S and H P of landmarks of the map, when no noise waits; nothing is changed.
+
+    Implements the reduced :eq:`eq-b22` (B22).  H is the real matrix of c at each landmark seen, and zero
+    elsewhere.  Parameters as for :func:`reduced_update_in_place`.
+    """
+    (B, m, _), pairs = z.shape, map_columns(columns)
+    c, tau = frame[:, :1], frame[:, 1:2]
+    r = c * (state.x_m[:, columns] + 1j * state.x_m[:, columns + 1]) - tau  # eq-b22, reduced
+    innovation = (z - np.stack([r.real, r.imag], -1)).reshape(B, 2 * m)
+    H = as_matrix(c)  # (B, 1, 2, 2)
+    rows = np.concatenate([transpose(state.P_pm.take(pairs, 2)), state.P_mm.take(pairs, 1)], 2)
+    HP = (H @ rows.reshape(B, m, 2, -1)).reshape(rows.shape)
+    S = (HP.take(4 + pairs, 2).reshape(B, 2 * m, m, 2) @ transpose(H)).reshape(B, 2 * m, 2 * m)
+    diagonal_blocks(S)[...] += cov_z
+    return Expected(innovation, S, HP)
 
 
 def as_matrix(c: Complex) -> Array:

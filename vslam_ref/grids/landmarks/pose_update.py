@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.filters.block_covariance import Blocks, move_means, whitened
+from vslam_ref.filters.block_covariance import Blocks, Expected, kalman_update_in_place
 from vslam_ref.geometry import so2
 
 WEAKEST = 1e-6
@@ -64,10 +64,5 @@ def pose_update(blocks: Blocks, H: ArrayLike, innovation: ArrayLike, variance: A
     b = blocks
     HP = H @ np.concatenate([b.P_pp, b.P_pm], axis=2)
     S = HP[:, :, :3] @ H.swapaxes(1, 2) + np.diag(np.asarray(variance, dtype=np.float64))
-    W, y = whitened(HP, innovation, S)
-    move_means(b.x_p, b.x_m, W, y)
-    WW = W.swapaxes(1, 2) @ W
-    b.P_pp -= WW[:, :3, :3]
-    b.P_pm -= WW[:, :3, 3:]
-    b.P_mm -= WW[:, 3:, 3:]
+    kalman_update_in_place(b.state, Expected(innovation, S, HP))
     b.x_p[:, 2] = so2.wrap(b.x_p[:, 2])

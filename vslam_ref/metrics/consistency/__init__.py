@@ -7,6 +7,7 @@ freedom, so its mean over many independent runs must stay near d.
 ============================  =====================================================================
 module                        holds
 ============================  =====================================================================
+``book``                      all of it in plain loops, to be read
 ``nees``                      the normalised square of one error: pose, SE(2) logarithm, lifted
                               (singular) coordinates, innovations
 ``bands``                     what the mean over runs may do: chi-squared lines and bands, and

@@ -30,6 +30,8 @@ class Band(NamedTuple):
 def mean_line(runs: int, dof: int = 3, level: float = 0.95) -> float:
     """One-sided upper line of the mean of ``runs`` independent NEES.
 
+    Implements :eq:`eq-band`.
+
     Parameters
     ----------
     runs : int
@@ -63,6 +65,8 @@ def mean_line(runs: int, dof: int = 3, level: float = 0.95) -> float:
 
 def mean_band(runs: int, dof: int = 3, level: float = 0.95) -> Band:
     """Two-sided band of the mean of ``runs`` independent NEES, equal tails.
+
+    Implements :eq:`eq-band`.
 
     Parameters and errors as for :func:`mean_line`.
 
@@ -114,12 +118,35 @@ def fraction_above(curves: ArrayLike, line: float, window: ArrayLike | None = No
 
 
 def time_maximum(curves: ArrayLike, window: ArrayLike | None = None) -> Array:
-    """Largest value of each curve (..., T) in the window; NaN where the curve has a NaN."""
+    """Largest value of each curve in the window.
+
+    Parameters
+    ----------
+    curves : array_like, shape (..., T)
+    window : array_like of bool, shape (T,), optional
+        Which time points count; all by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        NaN where the curve has a NaN.
+    """
     return np.asarray(np.max(_windowed(curves, window), axis=-1), dtype=np.float64)
 
 
 def window_mean(curves: ArrayLike, window: ArrayLike | None = None) -> Array:
-    """Average over time of each curve (..., T) in the window."""
+    """Average over time of each curve in the window.
+
+    Parameters
+    ----------
+    curves : array_like, shape (..., T)
+    window : array_like of bool, shape (T,), optional
+        Which time points count; all by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
     return np.asarray(np.mean(_windowed(curves, window), axis=-1), dtype=np.float64)
 
 

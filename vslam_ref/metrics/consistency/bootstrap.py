@@ -80,7 +80,19 @@ def subset_weights(population: int, size: int, samples: int, rng: np.random.Gene
 
 
 def mean_curves(weights: ArrayLike, data: ArrayLike) -> Array:
-    """Mean curves of draws, ``weights (S, M) @ data (M, T)`` -> (S, T)."""
+    """Mean curves of draws, one matrix product.
+
+    Parameters
+    ----------
+    weights : array_like, shape (S, M)
+        A draw a row; rows sum to one.
+    data : array_like, shape (M, T)
+        A run a row.
+
+    Returns
+    -------
+    ndarray, shape (S, T)
+    """
     w, x = np.asarray(weights, dtype=np.float64), np.asarray(data, dtype=np.float64)
     if w.ndim != 2 or x.ndim != 2 or w.shape[1] != x.shape[0]:
         raise ValueError(f"need weights (S, M) and data (M, T), got {w.shape} and {x.shape}")
@@ -95,7 +107,24 @@ def apply(weights: ArrayLike, data: ArrayLike, statistic: Statistic) -> Array:
 
 
 def percentile_interval(values: ArrayLike, level: float = 0.95) -> tuple[float, float]:
-    """Central interval that holds ``level`` of the values; NaN values make it NaN."""
+    """Central interval that holds a share of the values.
+
+    Parameters
+    ----------
+    values : array_like, shape (S,)
+        NaN values make the interval NaN.
+    level : float
+        The share, in (0, 1).
+
+    Returns
+    -------
+    (float, float)
+
+    Raises
+    ------
+    ValueError
+        If ``level`` is outside (0, 1).
+    """
     if not 0.0 < level < 1.0:
         raise ValueError(f"level must lie in (0, 1), got {level}")
     tail = (1.0 - level) / 2.0

@@ -60,6 +60,8 @@ class NormalisedSquare:
 def nees(error: ArrayLike, cov: ArrayLike) -> NormalisedSquare:
     r"""Normalised estimation error squared, ``e^T P^-1 e``.
 
+    Implements :eq:`eq-nees`.
+
     Parameters
     ----------
     error : array_like, shape (..., d)
@@ -83,7 +85,7 @@ def nees(error: ArrayLike, cov: ArrayLike) -> NormalisedSquare:
     P = L D L^T without square roots then gives :math:`q = \sum_j y_j^2 / D_j` with L y = e, and by
     Sylvester's criterion P is positive definite exactly when every pivot D_j is positive.  The pivots of
     a matrix with unit diagonal carry a rounding error of at most d eps or so: a pivot below that is
-    not told from zero, and the sample is invalid.
+    not distinguished from zero, and the sample is invalid.
 
     Examples
     --------
@@ -99,7 +101,7 @@ def nees(error: ArrayLike, cov: ArrayLike) -> NormalisedSquare:
         positive = pivot > d * EPS
         valid &= positive
         pivot = np.where(positive, pivot, 1.0)
-        value += e[..., j] ** 2 / pivot
+        value += e[..., j] ** 2 / pivot  # eq-nees
         column = C[..., j + 1 :, j] / pivot[..., None]
         e[..., j + 1 :] -= column * e[..., j, None]
         C[..., j + 1 :, j + 1 :] -= column[..., :, None] * C[..., None, j + 1 :, j]
@@ -246,7 +248,7 @@ def nees_singular(error: ArrayLike, cov: ArrayLike, *, steps: int = 1) -> Normal
 
     Rank: coordinates are scaled to unit variance, the eigenvalues then sum to d.  An eigenvalue solver is
     backward stable, so each is exact to ``d eps lambda_max``; every one of ``steps`` updates adds as much.
-    Eigenvalues below ``k = d * steps * eps * lambda_max`` are not told from zero; one below ``-k`` is
+    Eigenvalues below ``k = d * steps * eps * lambda_max`` are taken for zero; one below ``-k`` is
     negative, and the sample is invalid.
     """
     if steps < 1:

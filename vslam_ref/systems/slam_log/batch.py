@@ -262,7 +262,7 @@ def solve_batch(
     problem = _Problem(log, free)
     place = dict(zip(start.map.ids.tolist(), start.map.mean[0], strict=True))
     landmarks = np.array([place[int(i)] for i in problem.ids])
-    whole = np.column_stack([start.poses[:, :2], np.unwrap(start.poses[:, 2])])
+    whole = np.column_stack([start.T_run_vehicle[:, :2], np.unwrap(start.T_run_vehicle[:, 2])])
     times = sighting_times(log, calibration)
     poses = np.stack([np.interp(times, start.times, column) for column in whole.T], -1)
     start_here = problem.linearise((poses, landmarks, calibration))

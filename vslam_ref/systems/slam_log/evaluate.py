@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
 from vslam_ref.metrics.alignment import align_rigid, root_mean_square
+from vslam_ref.metrics.consistency import nees, pose_error
 from vslam_ref.systems.slam_log.log import Truth
 from vslam_ref.systems.slam_log.runner import LogRun
 
@@ -39,25 +40,24 @@ class Placed(NamedTuple):
     ----------
     T_world_run : ndarray, shape (3,)
     times : ndarray, shape (N,)
-    poses : ndarray, shape (N, 3)
-        Estimated, world frame.
+    T_world_vehicle : ndarray, shape (N, 3)
+        Estimated poses (x, y, theta), metres and radians.
     covs : ndarray, shape (N, 3, 3)
-        In the world frame.
+        Their covariances in the world frame.
     truth : ndarray, shape (N, 3)
+        True poses, world frame.
     """
 
     T_world_run: Array
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     covs: Array
     truth: Array
 
     @property
     def errors(self) -> Array:
-        """Estimated less true (x, y, theta), angles wrapped, shape (N, 3)."""
-        e = self.poses - self.truth
-        e[:, 2] = so2.wrap(np.nan_to_num(e[:, 2])) + 0.0 * e[:, 2]
-        return e
+        """Truth minus estimate of (x, y, theta), metres and radians, angles wrapped, shape (N, 3)."""
+        return pose_error(self.truth, self.T_world_vehicle)
 
     @property
     def nees(self) -> Array:
@@ -65,20 +65,30 @@ class Placed(NamedTuple):
 
         NaN where the covariance is singular: at a start that is certain.
         """
-        e, values = self.errors[:, :, None], np.full(len(self.times), np.nan)
-        ok: NDArray[np.bool_] = np.asarray(np.isfinite(self.covs).all((1, 2)))
-        ok[ok] = np.linalg.eigvalsh(self.covs[ok])[:, 0] > 0
-        values[ok] = np.sum(e[ok] * np.linalg.solve(self.covs[ok], e[ok]), (1, 2))
-        return values
+        return nees(self.errors, self.covs).value
 
 
 def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Where there is truth (N,), and the true poses there (n, 3), interpolated linearly in time."""
+    """Interpolate the truth linearly in time.
+
+    Parameters
+    ----------
+    truth : Truth
+    times : ndarray, shape (N,)
+        Seconds.
+
+    Returns
+    -------
+    ok : ndarray of bool, shape (N,)
+        Where there is truth.
+    poses : ndarray, shape (n, 3)
+        True T_world_vehicle there, metres and radians.
+    """
     after = np.clip(np.searchsorted(truth.times, times), 1, len(truth.times) - 1)
     t0, t1 = truth.times[after - 1], truth.times[after]
     ok = (times >= t0) & (times <= t1) & (t1 - t0 <= truth.max_gap)
     after, share = after[ok], ((times - t0) / (t1 - t0))[ok, None]
-    a, b = truth.poses[after - 1], truth.poses[after]
+    a, b = truth.T_world_vehicle[after - 1], truth.T_world_vehicle[after]
     step = b - a
     step[:, 2] = so2.wrap(np.nan_to_num(step[:, 2]))
     poses = a + share * step
@@ -93,7 +103,7 @@ def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
     Returns None where the truth cannot tell: no overlap in time, or, unaligned, no true heading.
     """
     ok, true = truth_at(truth, run.times)
-    poses, covs = reference_point(run.poses[ok], run.covs[ok], truth.lever)
+    poses, covs = reference_point(run.T_run_vehicle[ok], run.covs[ok], truth.lever)
     if aligned:
         if len(true) < 2:
             return None
@@ -108,7 +118,21 @@ def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
 
 
 def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Array]:
-    """Poses (N, 3) and covariances (N, 3, 3) of the point at ``lever`` (2,) in the vehicle frame."""
+    """Poses and covariances of another point of the vehicle.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (N, 3)
+        (x, y, theta), metres and radians, any frame.
+    covs : ndarray, shape (N, 3, 3)
+    lever : ndarray, shape (2,)
+        The point, vehicle frame, metres.
+
+    Returns
+    -------
+    poses, covs : ndarray, shapes (N, 3), (N, 3, 3)
+        In the same frame.
+    """
     arm = so2.rotate(poses[:, 2], np.broadcast_to(lever, (len(poses), 2)))
     J = np.tile(np.eye(3), (len(poses), 1, 1))
     J[:, 0, 2], J[:, 1, 2] = -arm[:, 1], arm[:, 0]
@@ -141,13 +165,26 @@ def errors_while_blind(run: LogRun, truth: Truth, after: float = 5.0) -> dict[st
 
 
 def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:
-    """Errors (m, 2) of the landmarks that are in both maps, after the motion ``T_world_run``."""
+    """Errors of the landmarks that are in both maps: truth minus estimate.
+
+    Parameters
+    ----------
+    run : LogRun
+    truth : Truth
+    T_world_run : ndarray, shape (3,)
+        Motion that puts the run into the world.
+
+    Returns
+    -------
+    ndarray, shape (m, 2)
+        World frame, metres.
+    """
     true = dict(zip(truth.ids.tolist(), truth.landmarks, strict=True))
     pairs = [(m, true[i]) for i, m in zip(run.map.ids.tolist(), run.map.mean[0], strict=True) if i in true]
     if not pairs:
         return np.zeros((0, 2))
     mine, theirs = (np.array(side) for side in zip(*pairs, strict=True))
-    return np.asarray(se2.act(T_world_run, mine) - theirs)
+    return np.asarray(theirs - se2.act(T_world_run, mine))
 
 
 def summary(run: LogRun, truth: Truth | None) -> dict[str, float | int | None]:

@@ -71,8 +71,8 @@ class Truth(NamedTuple):
     ----------
     times : ndarray, shape (N,)
         Strictly increasing.
-    poses : ndarray, shape (N, 3)
-        (x, y, theta); theta is NaN where the reference knows positions only.
+    T_world_vehicle : ndarray, shape (N, 3)
+        (x, y, theta), metres and radians; theta is NaN where the reference knows positions only.
     max_gap : float
         Between two samples further apart than this, seconds, there is no truth.
     ids, landmarks : ndarray, shapes (n,) and (n, 2)
@@ -84,7 +84,7 @@ class Truth(NamedTuple):
     """
 
     times: Array
-    poses: Array
+    T_world_vehicle: Array
     max_gap: float
     ids: IntArray
     landmarks: Array

@@ -28,7 +28,18 @@ class RelativePoses(NamedTuple):
 
 
 def dead_reckoning(increments: Array) -> Array:
-    """Poses (K + 1, 3) from increments (K, 2); each moves along the middle heading. theta is not wrapped."""
+    """Poses from increments; each moves along its middle heading.
+
+    Parameters
+    ----------
+    increments : ndarray, shape (K, 2)
+        ds (m) and dalpha (rad).
+
+    Returns
+    -------
+    ndarray, shape (K + 1, 3)
+        In the frame of the start; theta is not wrapped.
+    """
     theta = np.concatenate([[0.0], np.cumsum(increments[:, 1])])
     middle = theta[:-1] + increments[:, 1] / 2
     step = increments[:, :1] * np.stack([np.cos(middle), np.sin(middle)], -1)
@@ -36,7 +47,19 @@ def dead_reckoning(increments: Array) -> Array:
 
 
 def preintegrate(line: Timeline, nodes: IntArray) -> RelativePoses:
-    """Relative poses between consecutive ``nodes`` (cut indices, increasing)."""
+    """Relative poses between consecutive nodes, with covariances.
+
+    Parameters
+    ----------
+    line : Timeline
+    nodes : ndarray of int, shape (K,)
+        Cut indices, increasing.
+
+    Returns
+    -------
+    RelativePoses
+        Metres and radians, each in the frame of its start.
+    """
     path = dead_reckoning(line.increments)
     var_s, var_a = line.cov[:, 0, 0], line.cov[:, 1, 1]
     c, s = np.cos(path[:-1, 2]), np.sin(path[:-1, 2])

@@ -12,7 +12,6 @@ chi-squared quantile throws away what would have put the filter right, and then 
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -25,6 +24,7 @@ from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import MapEstimate, SlamFilter
 from vslam_ref.filters.vehicle import Increment
+from vslam_ref.metrics.consistency import nis
 from vslam_ref.systems.slam_log.calibration import Calibration
 from vslam_ref.systems.slam_log.log import SlamLog
 from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
@@ -110,8 +110,7 @@ class Seen(NamedTuple):
     @property
     def nis(self) -> Array:
         """Normalised innovation squared of each, shape (N,)."""
-        weighted = np.linalg.solve(self.S, self.innovation[:, :, None])
-        return np.asarray(np.sum(self.innovation[:, :, None] * weighted, (1, 2)))
+        return nis(self.innovation, self.S).value
 
 
 class LogRun(NamedTuple):
@@ -122,7 +121,10 @@ class LogRun(NamedTuple):
     filter : str
     times : ndarray, shape (R,)
         Records, seconds.
-    poses, covs : ndarray, shapes (R, 3) and (R, 3, 3)
+    T_run_vehicle : ndarray, shape (R, 3)
+        Estimated poses (x, y, theta), metres and radians, in the frame of the start.
+    covs : ndarray, shape (R, 3, 3)
+        Their covariances.
     map : MapEstimate
         Batch of one.
     seen : Seen
@@ -130,7 +132,7 @@ class LogRun(NamedTuple):
 
     filter: str
     times: Array
-    poses: Array
+    T_run_vehicle: Array
     covs: Array
     map: MapEstimate
     seen: Seen
@@ -142,7 +144,18 @@ class LogRun(NamedTuple):
 
 
 def record_times(log: SlamLog, settings: RunSettings) -> Array:
-    """Times of the records: the log's start, then every ``record_period``."""
+    """Times of the records: the log's start, then every ``record_period``.
+
+    Parameters
+    ----------
+    log : SlamLog
+    settings : RunSettings
+
+    Returns
+    -------
+    ndarray, shape (R,)
+        Seconds.
+    """
     count = int((log.times[-1] - log.times[0]) / settings.record_period + 1e-9)
     return np.asarray(log.times[0] + settings.record_period * np.arange(count + 1))
 
@@ -209,21 +222,15 @@ class _Runner:
         self.filter = filter
         self.gate = gate
         self.records: list[Any] = []
-        self._known: set[int] = set()
         self._seen: list[tuple[float, int, Array, Array, Array, bool]] = []
 
     def see(self, time: float, identity: int, polar: Array, z: Array, cov_z: Array) -> None:
-        """Try an update on a copy; the copy takes over if the gate lets it pass."""
-        trial = copy.deepcopy(self.filter) if identity in self._known else self.filter
-        found = trial.update([identity], z[None, None], cov_z)
-        self._known.add(identity)
-        if found is None:
-            return
-        y, S = found.innovation[0], found.S[0]
-        passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
-        self._seen.append((time, identity, polar, y, S, passed))
-        if passed:
-            self.filter = trial
+        """Use a sighting if the gate lets its innovation pass; a new landmark has none."""
+        found = self.filter.update([identity], z[None, None], cov_z, self.gate)
+        if found is not None:
+            y, S = found.innovation[0], found.S[0]
+            passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
+            self._seen.append((time, identity, polar, y, S, passed))
 
     def seen(self) -> Seen:
         """Everything seen, as arrays."""

@@ -60,7 +60,19 @@ def control_increments(log: SlamLog, calibration: Calibration) -> Array:
 
 
 def increment_variances(increments: Array, calibration: Calibration) -> Array:
-    """Variances (..., 2) of ds and dalpha of increments (..., 2); see :class:`Calibration`."""
+    """Variances of increments; see :class:`Calibration`.
+
+    Parameters
+    ----------
+    increments : ndarray, shape (..., 2)
+        ds (m) and dalpha (rad).
+    calibration : Calibration
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        m^2 and rad^2.
+    """
     way, turn = np.abs(increments[..., 0]), np.abs(increments[..., 1])
     distance = calibration.sigma_distance**2 * way
     heading = calibration.sigma_turn**2 * turn + calibration.sigma_drift**2 * way

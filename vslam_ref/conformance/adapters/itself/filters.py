@@ -10,9 +10,10 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.filters import observation, vehicle
+from vslam_ref.filters.block_covariance import Blocks
 from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, ReducedCarlemanEkf, carleman_ekf, lift, moments
 from vslam_ref.filters.carleman_ekf.reduced_moments import start_moments
-from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, Truth
+from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.filters.range_bearing import cartesian_from_polar
 
@@ -27,8 +28,15 @@ def _slam(x: Array, P: Array) -> EkfSlam:
     """The filter in the middle of a run."""
     slam = EkfSlam(x[:3], P[:3, :3])
     n = (len(x) - 3) // 2
-    slam.blocks.append(np.arange(n), x[None, 3:], P[None, 3:, 3:], P[None, :3, 3:], np.zeros((1, 0, 2 * n)))
+    _fill(slam.blocks, n, x, P)
     return slam
+
+
+def _fill(blocks: Blocks, n: int, x: Array, P: Array) -> None:
+    """Put a mean (p + 2 n,) and a covariance of a whole run into blocks that hold no landmark yet."""
+    p = len(x) - 2 * n
+    blocks.append(np.arange(n), x[None, p:], np.zeros((1, 2 * n, p)), np.zeros((1, n, 2, 2)))
+    blocks.x_p[:], blocks.P_pp[:], blocks.P_pm[:], blocks.P_mm[:] = x[:p], P[:p, :p], P[:p, p:], P[p:, p:]
 
 
 def _named(names: str, found: tuple[Array, Array]) -> dict[str, Array]:
@@ -78,11 +86,7 @@ def _trace(x: Array, P: Array, **run: Any) -> Steps:
 
 def _lifted(Z: Array, P: Array, control: str = "first_order") -> LiftedCarlemanEkf:
     """The lifted filter in the middle of a run."""
-    n = (len(Z) - lift.VEHICLE) // lift.LANDMARK
-    slam = LiftedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=n, control=control)
-    slam._z, slam._P = Z[None].copy(), P[None].copy()
-    slam._slots = {i: i for i in range(n)}
-    return slam
+    return LiftedCarlemanEkf.from_state(Z[None], P[None], control)
 
 
 def _increment(increment: Array, cov: Array) -> vehicle.Increment:
@@ -106,24 +110,16 @@ def _pose(z: Array, P: Array) -> dict[str, Array]:
 def _reduced_predict(
     m: Array, P: Array, increment: Array, cov: Array, control: str = "first_order"
 ) -> dict[str, Array]:
-    """Landmarks are r = c rho - tau inside: rho is r at the start, and is turned back at the end."""
     n = (len(m) - 4) // 2
-    slam = ReducedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=max(n, 1), control=control)
-    slam._blocks.x_p[:], slam._blocks.P_pp[:] = m[:4], P[:4, :4]
-    slam._blocks.append(np.arange(n), m[None, 4:], P[None, 4:, 4:], P[None, :4, 4:], np.zeros((1, 0, 2 * n)))
+    slam = ReducedCarlemanEkf(np.zeros(3), np.zeros((3, 3)), capacity=n, control=control)
+    _fill(slam.blocks, n, m, P)
     slam.predict(_increment(increment, cov))
-    slam._apply()
-    (c, tau), (mean, full) = slam._frame[0, :2], slam.blocks.full()
-    turn = np.eye(len(m))
-    for at in range(4, len(m), 2):
-        turn[at : at + 2, at : at + 2] = [[c.real, -c.imag], [c.imag, c.real]]
-    after = turn @ mean[0]
-    after[4::2], after[5::2] = after[4::2] - tau.real, after[5::2] - tau.imag
-    return {"m": after, "P": turn @ full[0] @ turn.T}
+    mean, cov = slam.state()
+    return {"m": mean[0], "P": cov[0]}
 
 
 def _ideal(x: Array, P: Array, truth: Array, landmarks: Array, **run: Any) -> Steps:
-    return _pose_steps(EkfSlam(x, P, truth=Truth(truth, landmarks)), **run)
+    return _pose_steps(IdealEkf(x, P, Truth(truth, landmarks)), **run)
 
 
 def _pose_steps(slam: SlamFilter, **run: Any) -> Steps:
