@@ -37,9 +37,20 @@ def kernel(*arguments, returns=types.void):
     return declare
 
 
-def compiled(dispatcher):
-    """Compile a kernel for its signature, or read it from the cache, and for no other."""
+def unpacks(dispatcher):
+    """Declare a twin in Python that hands the fields of NamedTuples to a kernel."""
+
+    def declare(function):
+        function.kernel = dispatcher
+        return function
+
+    return declare
+
+
+def compiled(twin):
+    """Compile a kernel for its signature, or read it from the cache, and for no other; return the twin."""
+    dispatcher = getattr(twin, "kernel", twin)
     if not dispatcher.signatures:
         dispatcher.compile(dispatcher.signature)
         dispatcher.disable_compile()
-    return dispatcher
+    return twin
