@@ -161,25 +161,13 @@ def _clipped(v, bound):
 @njit(cache=True)
 def _explain(window, low, s, columns, reach, lines):
     """Flag hits that a static cell explains, and those that continue a line: before S changes."""
-    for at in range(window.size):
-        r, c = at // window.shape[1], at % window.shape[1]
-        if window[r, c] == HIT:
-            row, column = r + low[1], c + low[0]
-            explained = reach > 0 and _near_static(s, columns, row, column, reach)
-            in_line = lines and _continues_line(s, columns, row, column)
-            window[r, c] |= (EXPLAINED if explained else 0) | (IN_LINE if in_line else 0)
-
-
-@njit(cache=True)
-def _visit(at, is_hit, now, gap, seen, last_hit, since):
-    """Keep account of hits: a visit begins, goes on, or is over."""
-    if is_hit:
-        unseen = now - seen[at]
-        shifted = since[at] + (unseen if unseen > gap else 0.0)
-        since[at] = now if last_hit[at] == -np.inf else shifted
-        last_hit[at] = now
-    elif now - last_hit[at] > gap:
-        last_hit[at] = -np.inf
+    for r in range(window.shape[0]):
+        for c in range(window.shape[1]):
+            if window[r, c] == HIT:
+                row, column = r + low[1], c + low[0]
+                explained = reach > 0 and _near_static(s, columns, row, column, reach)
+                in_line = lines and _continues_line(s, columns, row, column)
+                window[r, c] |= (EXPLAINED if explained else 0) | (IN_LINE if in_line else 0)
 
 
 @kernel(
@@ -203,7 +191,13 @@ def _apply_scan(
             old = s[at]
             state = _state(old)
             is_hit = 1 if look >= HIT else 0
-            _visit(at, is_hit, now, gap, seen, last_hit, since)
+            if is_hit:
+                unseen = now - seen[at]
+                shifted = since[at] + (unseen if unseen > gap else 0.0)
+                since[at] = now if last_hit[at] == -np.inf else shifted
+                last_hit[at] = now
+            elif now - last_hit[at] > gap:
+                last_hit[at] = -np.inf
             if is_hit and state == FREE and now - since[at] >= (in_line if look & IN_LINE else settle):
                 old, state = 0.0, UNKNOWN
             prior = 0.0 if now - seen[at] > lifetime else d[at]

@@ -69,9 +69,9 @@ def apply_plain(log_odds: Array, columns: int, beams: BeamsInCells, evidence: Ar
 
     Notes
     -----
-    The plain form is ``np.clip(part + table[window], -bound, bound)``.  It takes twice as long, and OG-1 would
-    be missed (17 times as fast as loops, where 30 are asked); so the sum is built in an array of its own, as
-    work within the map's rows is slower, and by a product instead of a look-up.
+    The plain form is ``np.clip(part + table[window], -bound, bound)``.  It takes twice as long, and OG-1
+    would be missed (17 times as fast as loops, where 30 are asked).  So the sum is built in an array of
+    its own, as work within the map's rows is slower, and by a product instead of a look-up.
     """
     whole = log_odds.reshape(-1, columns)
     rows, columns_seen, window = look(whole.shape, beams)
