@@ -36,29 +36,25 @@ from vslam_ref.grids.map_config import MapConfig
 from vslam_ref.grids.plain import PlainMap
 from vslam_ref.grids.scan import ScanLike, sort_beams
 from vslam_ref.grids.static_dynamic import StaticDynamicMap
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class GridSlamConfig:
     """The loop's parts; every field says why it has its value."""
 
-    separate: bool = field(default=True, metadata={"reason": "S and D; False: one plain occupancy grid"})
-    match: bool = field(
-        default=True, metadata={"reason": "scan against map, the second way of A4.4's localisation"}
+    separate: bool = assume(True, "", "S and D; False: one plain occupancy grid")
+    match: bool = assume(True, "", "scan against map, the second way of A4.4's localisation")
+    leave_out_moving: bool = assume(
+        False, "", "a matcher with a cut ignores them anyway; True: beams that D takes for moving"
     )
-    leave_out_moving: bool = field(
-        default=False,
-        metadata={"reason": "a matcher with a cut ignores them anyway; True: beams that D takes for moving"},
-    )
-    landmarks: bool = field(default=True, metadata={"reason": "A4.4's landmarks"})
-    map: MapConfig = field(default_factory=MapConfig, metadata={"reason": "see there"})
-    matching: MatchConfig = field(default_factory=MatchConfig, metadata={"reason": "see there"})
-    corners: CornerConfig = field(default_factory=CornerConfig, metadata={"reason": "see there"})
-    corners_of_s: MapCornerConfig = field(default_factory=MapCornerConfig, metadata={"reason": "see there"})
-    choice: LandmarkConfig = field(default_factory=LandmarkConfig, metadata={"reason": "see there"})
-    field_reach: float = field(
-        default=0.5, metadata={"reason": "more than where the search's loss ends", "unit": "m"}
-    )
+    landmarks: bool = assume(True, "", "A4.4's landmarks")
+    map: MapConfig = field(default_factory=MapConfig)
+    matching: MatchConfig = field(default_factory=MatchConfig)
+    corners: CornerConfig = field(default_factory=CornerConfig)
+    corners_of_s: MapCornerConfig = field(default_factory=MapCornerConfig)
+    choice: LandmarkConfig = field(default_factory=LandmarkConfig)
+    field_reach: float = assume(0.5, "m", "more than where the search's loss ends")
 
 
 class Step(NamedTuple):

@@ -16,15 +16,16 @@ from vslam_ref.grids import MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.clusters import Clusters, TrackConfig, Tracker, find_clusters
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid, entropy_bits
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class GridConfig:
     """Maps and tracks of a log."""
 
-    map: MapConfig = field(default_factory=MapConfig, metadata={"reason": "see there"})
-    tracks: TrackConfig = field(default_factory=TrackConfig, metadata={"reason": "see there"})
-    video_frames: int = field(default=300, metadata={"reason": "half a minute at ten a second; 0 for none"})
+    map: MapConfig = field(default_factory=MapConfig)
+    tracks: TrackConfig = field(default_factory=TrackConfig)
+    video_frames: int = assume(300, "", "half a minute at ten a second; 0 for none")
 
     def __post_init__(self) -> None:
         """Check the number of frames."""

@@ -24,6 +24,7 @@ from vslam_ref.grids.landmarks.association import TURN, Signature, look_alike
 from vslam_ref.grids.landmarks.lines import Corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, map_corners, static_along_arms
 from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.support.config import assume
 
 Why = Literal["", "seen through", "no longer static in S"]
 
@@ -32,33 +33,17 @@ Why = Literal["", "seen through", "no longer static in S"]
 class LandmarkConfig:
     """How landmarks are chosen and withdrawn; every field says why it has its value."""
 
-    static_only: bool = field(default=True, metadata={"reason": "A4.4: landmarks must be taken from S"})
-    withdraw: bool = field(
-        default=True, metadata={"reason": "what was static when chosen may be moved later"}
-    )
-    confirm: int = field(
-        default=5, metadata={"reason": "a second of scans; noise makes no corner five times"}
-    )
-    same: float = field(
-        default=0.12, metadata={"reason": "a candidate seen again; four sigma of a corner", "unit": "m"}
-    )
-    forget: int = field(
-        default=10, metadata={"reason": "two seconds unseen: the candidate was none", "unit": "scans"}
-    )
-    apart: float = field(
-        default=0.6, metadata={"reason": "look-alikes nearer than a gate's width", "unit": "m"}
-    )
-    corner_of_s: float = field(
-        default=0.3, metadata={"reason": "three cells from a corner of S", "unit": "m"}
-    )
-    arms: float = field(default=0.8, metadata={"reason": "share of both arms decided static by S"})
-    arms_left: float = field(default=0.3, metadata={"reason": "below it S has taken the walls away"})
-    beyond: float = field(
-        default=0.25, metadata={"reason": "a beam that ends this far behind went through", "unit": "m"}
-    )
-    through: int = field(
-        default=3, metadata={"reason": "three scans running: noise does not", "unit": "scans"}
-    )
+    static_only: bool = assume(True, "", "A4.4: landmarks must be taken from S")
+    withdraw: bool = assume(True, "", "what was static when chosen may be moved later")
+    confirm: int = assume(5, "", "a second of scans; noise makes no corner five times")
+    same: float = assume(0.12, "m", "a candidate seen again; four sigma of a corner")
+    forget: int = assume(10, "scans", "two seconds unseen: the candidate was none")
+    apart: float = assume(0.6, "m", "look-alikes nearer than a gate's width")
+    corner_of_s: float = assume(0.3, "m", "three cells from a corner of S")
+    arms: float = assume(0.8, "", "share of both arms decided static by S")
+    arms_left: float = assume(0.3, "", "below it S has taken the walls away")
+    beyond: float = assume(0.25, "m", "a beam that ends this far behind went through")
+    through: int = assume(3, "scans", "three scans running: noise does not")
 
     def __post_init__(self) -> None:
         """Check the numbers."""

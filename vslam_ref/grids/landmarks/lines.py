@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,27 +21,22 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import so2
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class CornerConfig:
     """When two runs of a scan make a corner; every field says why it has its value."""
 
-    sigma: float = field(
-        default=0.015, metadata={"reason": "of a range, as the laser's data sheet has it", "unit": "m"}
-    )
-    usable_range: float = field(default=8.0, metadata={"reason": "half a degree is 7 cm there", "unit": "m"})
-    jump: float = field(
-        default=0.25, metadata={"reason": "half a door leaf; more parts two things", "unit": "m"}
-    )
-    bend: float = field(default=0.05, metadata={"reason": "three sigma: less is noise, no bend", "unit": "m"})
-    least_points: int = field(default=6, metadata={"reason": "a leg at 1.5 m gives five"})
-    least_length: float = field(default=0.25, metadata={"reason": "longer than a leg is wide", "unit": "m"})
-    least_angle: float = field(
-        default=0.7, metadata={"reason": "40 degrees: flatter corners lie anywhere", "unit": "rad"}
-    )
-    reach: float = field(default=0.15, metadata={"reason": "runs end this near to the corner", "unit": "m"})
-    floor: float = field(default=0.01, metadata={"reason": "walls are not straighter than that", "unit": "m"})
+    sigma: float = assume(0.015, "m", "of a range, as the laser's data sheet has it")
+    usable_range: float = assume(8.0, "m", "half a degree is 7 cm there")
+    jump: float = assume(0.25, "m", "half a door leaf; more parts two things")
+    bend: float = assume(0.05, "m", "three sigma: less is noise, no bend")
+    least_points: int = assume(6, "", "a leg at 1.5 m gives five")
+    least_length: float = assume(0.25, "m", "longer than a leg is wide")
+    least_angle: float = assume(0.7, "rad", "40 degrees: flatter corners lie anywhere")
+    reach: float = assume(0.15, "m", "runs end this near to the corner")
+    floor: float = assume(0.01, "m", "walls are not straighter than that")
 
     def __post_init__(self) -> None:
         """Check the numbers."""

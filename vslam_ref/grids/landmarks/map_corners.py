@@ -11,7 +11,7 @@ sense of least squares, on all walls of the window: the corner, to a fraction of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,21 +19,18 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class MapCornerConfig:
     """When the static map has a corner; every field says why it has its value."""
 
-    smooth: float = field(default=0.8, metadata={"reason": "hides the raster's steps", "unit": "cells"})
-    window: float = field(
-        default=2.0, metadata={"reason": "both arms, and not the next corner", "unit": "cells"}
-    )
-    least: float = field(
-        default=0.075, metadata={"reason": "a clean L has 0.095, the end of a wall 0.06, a wall 0"}
-    )
-    decided: float = field(default=0.9, metadata={"reason": "A: S and D are determined above 0.9"})
-    near: float = field(default=0.3, metadata={"reason": "two maxima of one corner", "unit": "m"})
+    smooth: float = assume(0.8, "cells", "hides the raster's steps")
+    window: float = assume(2.0, "cells", "both arms, and not the next corner")
+    least: float = assume(0.075, "", "a clean L has 0.095, the end of a wall 0.06, a wall 0")
+    decided: float = assume(0.9, "", "A: S and D are determined above 0.9")
+    near: float = assume(0.3, "m", "two maxima of one corner")
 
     def __post_init__(self) -> None:
         """Check the numbers."""

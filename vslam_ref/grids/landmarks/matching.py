@@ -11,7 +11,7 @@ something else).  Neither is the standard deviation ``sigma``, which weighs the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,11 +20,8 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Tukey
 from vslam_ref.geometry import se2, so2
-from vslam_ref.grids.landmarks.field import (
-    DistanceField,
-    sample,
-    scan_residuals_with_jacobians,
-)
+from vslam_ref.grids.landmarks.field import DistanceField, sample, scan_residuals_with_jacobians
+from vslam_ref.support.config import assume
 
 FINE = 1e-4
 """Steps below this (m, rad) end the refinement: a hundredth of what the map resolves."""
@@ -37,29 +34,14 @@ Reason = Literal["converged", "too few points on the map", "no convergence"]
 class MatchConfig:
     """How a scan is matched; every field says why it has its value."""
 
-    sigma: float = field(
-        default=0.05,
-        metadata={"reason": "a cell's half side, with the range noise far below it", "unit": "m"},
-    )
-    cut: float = field(
-        default=0.1,
-        metadata={"reason": "a cell: what is farther off is something else; inf: nothing is", "unit": "m"},
-    )
-    search_cut: float = field(
-        default=0.3,
-        metadata={"reason": "a step of the box: 7 cm, and 17 cm more at 5 m", "unit": "m"},
-    )
-    window: float = field(
-        default=0.2, metadata={"reason": "twice the worst step of the odometry", "unit": "m"}
-    )
-    window_angle: float = field(
-        default=0.1, metadata={"reason": "four sigma of a step's turn", "unit": "rad"}
-    )
-    steps: int = field(
-        default=3, metadata={"reason": "tries on each side: 7 cm apart, inside the field's valley"}
-    )
-    least_points: int = field(default=10, metadata={"reason": "three unknowns, and robust weights to judge"})
-    iterations: int = field(default=20, metadata={"reason": "five suffice; more means no convergence"})
+    sigma: float = assume(0.05, "m", "a cell's half side, with the range noise far below it")
+    cut: float = assume(0.1, "m", "a cell: what is farther off is something else; inf: nothing is")
+    search_cut: float = assume(0.3, "m", "a step of the box: 7 cm, and 17 cm more at 5 m")
+    window: float = assume(0.2, "m", "twice the worst step of the odometry")
+    window_angle: float = assume(0.1, "rad", "four sigma of a step's turn")
+    steps: int = assume(3, "", "tries on each side: 7 cm apart, inside the field's valley")
+    least_points: int = assume(10, "", "three unknowns, and robust weights to judge")
+    iterations: int = assume(20, "", "five suffice; more means no convergence")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
