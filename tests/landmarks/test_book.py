@@ -107,7 +107,7 @@ def state(seed: int) -> tuple[GridSlam, np.ndarray, np.ndarray, list[book.Corner
     slam.filter.update(np.arange(3), z[None, :3] + rng.normal(0, 0.02, (1, 3, 2)), 0.05**2 * np.eye(2))
     marks = []
     for k in range(4):
-        bisector, opening, convex = float(so2.wrap(slam.pose[2] + 0.3)), 1.6, k < 3
+        bisector, opening, convex = float(so2.wrap(slam.T_world_robot[2] + 0.3)), 1.6, k < 3
         slam.landmarks.landmarks.append(Landmark(k, bisector, opening, convex, np.zeros(2), born=0))
         marks.append(book.Corner(np.zeros(2), np.zeros((2, 2)), bisector, opening, convex))
     x, P = (a[0].copy() for a in slam.filter.blocks.full())
@@ -183,7 +183,7 @@ def test_a_match_and_what_the_filter_makes_of_it_are_the_books(seed: int) -> Non
     p, A = book.match(predicted, cov, points, floor, config.sigma, config.cut)
     assert found.reason == "converged"
     assert found.iterations > 1
-    np.testing.assert_allclose(found.pose, p, **CLOSE)
+    np.testing.assert_allclose(found.T_world_laser, p, **CLOSE)
     np.testing.assert_allclose(found.information, A, **CLOSE)
 
     x[:3] += rng.normal(0, 0.01, 3) - x[:3] + predicted  # the filter stands where the prediction does

@@ -25,6 +25,8 @@ FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 def log_odds(probability: ArrayLike) -> Array:
     """Return ``ln(p / (1 - p))`` of probabilities strictly between 0 and 1.
 
+    Implements the left side of :eq:`eq-log-odds`.
+
     Raises
     ------
     ValueError
@@ -44,6 +46,8 @@ def log_odds(probability: ArrayLike) -> Array:
 
 def probability(log_odds: ArrayLike) -> Array:
     """Return ``1 / (1 + exp(-L))``, for any L without overflow.
+
+    Implements the right side of :eq:`eq-log-odds`.
 
     Examples
     --------

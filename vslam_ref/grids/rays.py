@@ -168,6 +168,7 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
 def _rows_at_lines(rise: Array, offset: Array, run: Array, line: ArrayLike) -> tuple[Array, BoolArray]:
     """Rows in which mirrored beams cross lines between columns, and whether they do so in a corner.
 
+    Implements :eq:`eq-beam-height`.
     Both cells beside the line are crossed; in a corner the right one only.
     """
     height = rise * np.asarray(line)

@@ -93,6 +93,6 @@ def follow(evidence: ArrayLike, reading: Reading, table: Table, start: float = 0
         first = seen + (now if table == "conditioned" else 0.0)
         transition = now if reading == "unchanged" else 0.0
         prediction = 0.0 if reading == "forgetful" else now
-        now = float(recursion(first, transition, prediction))
+        now = float(recursion(first, transition, prediction))  # eq-twice for "printed", "conditioned"
         path[k] = now
     return path

@@ -101,15 +101,12 @@ def rules_of(config: MapConfig) -> Rules:
     """Return the numbers of a config, its switches turned into numbers that need no case."""
     settle = math.inf if config.settle_seconds is None else config.settle_seconds
     in_line = settle if config.settle_in_line is None else min(config.settle_in_line, settle)
+    steps = config.sensor.steps(config.d_high_where)
+    s_bound, d_bound = log_odds([config.s_most, config.d_most]).tolist()
+    lifetime = config.d_lifetime if config.d_memory == "formula" else -1.0
+    reach, graze = config.explained_by, config.graze
     return Rules(
-        *config.sensor.steps(config.d_high_where),
-        *log_odds([config.s_most, config.d_most]).tolist(),
-        config.d_lifetime if config.d_memory == "formula" else -1.0,
-        settle,
-        in_line,
-        config.hit_gap,
-        config.explained_by,
-        config.graze,
+        steps.static, steps.dynamic, s_bound, d_bound, lifetime, settle, in_line, config.hit_gap, reach, graze
     )
 
 

@@ -49,10 +49,10 @@ def corner(runs: tuple[Array, Array], sigma: float, floor: float) -> Corner:
         var.append(
             (sigma**2 / len(points), sigma**2 / sum((t @ (x - c)) ** 2 for x in points))
         )  # eq-line-variances
-    X = np.linalg.solve(N, right)  # eq-corner-crossing
+    N_inv = np.linalg.inv(N)
+    X = N_inv @ right  # eq-corner-crossing
     lever = [t @ (X - c) for t, c in turned]
     D = np.diag([var[i][0] + lever[i] ** 2 * var[i][1] for i in range(2)])
-    N_inv = np.linalg.inv(N)
     return Corner(X, N_inv @ D @ N_inv.T + floor**2 * np.eye(2))  # eq-corner-cov
 
 
@@ -67,17 +67,17 @@ def corner_of_map(
     P_S: Array, row: int, column: int, smooth: float = 0.8, window: float = 2.0
 ) -> tuple[Array, float]:
     """Corner (x, y) of S near a cell, in cells from the middle of the first one, and its strength."""
-    i, j = (np.arange(n) for n in P_S.shape)
+    i, j = (np.arange(float(n)) for n in P_S.shape)
     q = np.maximum(2 * P_S - 1, 0)
     q = gaussian(i[:, None] - i, smooth) @ q @ gaussian(j[:, None] - j, smooth)
-    g_y, g_x = np.gradient(q)
-    w = np.outer(gaussian(i - row, window), gaussian(j - column, window))
+    g_y, g_x = list[Array](np.gradient(q))
+    w: Array = np.outer(gaussian(i - row, window), gaussian(j - column, window))
     M, Mx = np.zeros((2, 2)), np.zeros(2)
-    for r, c in np.argwhere(w):
+    for r, c in np.argwhere(w > 0):
         g = np.array([g_x[r, c], g_y[r, c]])
         M += w[r, c] * np.outer(g, g)
         Mx += w[r, c] * np.outer(g, g) @ [c, r]
-    return np.linalg.solve(M, Mx), math.sqrt(np.linalg.eigvalsh(M)[0])  # eq-foerstner
+    return np.linalg.inv(M) @ Mx, math.sqrt(np.linalg.eigvalsh(M)[0])  # eq-foerstner
 
 
 def static_share(P_S: Array, side: float, xy: Array, arm: float) -> float:

@@ -288,6 +288,7 @@ def _meet(lines: Lines, c: CornerConfig) -> Corners:
     )
     near = (gap <= c.reach).all(axis=1)
     pair, xy, J_offset, J_angle = pair[near], at.value[near], at.J_offset[near], at.J_angle[near]
+    # eq-corner-cov
     cov = (J_offset * lines.var_offset[pair][:, None]) @ J_offset.swapaxes(1, 2)
     cov = cov + (J_angle * lines.var_angle[pair][:, None]) @ J_angle.swapaxes(1, 2) + c.floor**2 * np.eye(2)
     back, on = so2.wrap(lines.angle[pair[:, 0]] + np.pi), lines.angle[pair[:, 1]]

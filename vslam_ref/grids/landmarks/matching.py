@@ -58,7 +58,7 @@ class Match(NamedTuple):
 
     Attributes
     ----------
-    pose : ndarray, shape (3,)
+    T_world_laser : ndarray, shape (3,)
         Most probable pose, prediction included.
     information : ndarray, shape (3, 3)
         J^T W J / sigma^2: of the scan alone; may be singular, as along a corridor.
@@ -66,10 +66,10 @@ class Match(NamedTuple):
         Points with a weight above one half.
     iterations : int
     reason : {"converged", "too few points on the map", "no convergence"}
-        With the second, ``pose`` is the prediction and ``information`` zero.
+        With the second, ``T_world_laser`` is the prediction and ``information`` zero.
     """
 
-    pose: Array
+    T_world_laser: Array
     information: Array
     inliers: int
     iterations: int
@@ -148,9 +148,9 @@ def correlative(objective: Objective, config: MatchConfig) -> Array:
     box = np.stack(np.meshgrid(tries, tries, tries, indexing="ij"), -1).reshape(-1, 3)
     box = box[np.argsort((box**2).sum(axis=1), kind="stable")]
     poses = around + box * [c.window, c.window, c.window_angle]
-    pose: Array = poses[int(np.argmin(objective.cost(poses)))]
-    pose[2] = so2.wrap(pose[2])
-    return pose
+    T_world_laser: Array = poses[int(np.argmin(objective.cost(poses)))]
+    T_world_laser[2] = so2.wrap(T_world_laser[2])
+    return T_world_laser
 
 
 def match_scan(
@@ -192,28 +192,28 @@ def match_scan(
             f"prediction {predicted.shape} and covariance {cov.shape}: need finite (3,) and (3, 3)"
         )
     o = Objective(field, points, predicted, np.linalg.inv(cov), c.sigma, c.cut)
-    pose = correlative(o._replace(cut=c.search_cut), c)
-    now = float(o.cost(pose)[0])
+    T_world_laser = correlative(o._replace(cut=c.search_cut), c)
+    now = float(o.cost(T_world_laser)[0])
     for iteration in range(1, c.iterations + 1):
-        r = scan_residuals_with_jacobians(pose, points, field)
+        r = scan_residuals_with_jacobians(T_world_laser, points, field)
         d, J = r.value[:, 0], r.J_pose[:, 0]
         weight = o.loss.weight(d)
         inliers = int((weight > 0.5).sum())
         if inliers < c.least_points:
             return Match(predicted.copy(), np.zeros((3, 3)), inliers, iteration, "too few points on the map")
         information = (J * weight[:, None]).T @ J / c.sigma**2
-        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ _difference(pose, predicted)
+        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ _difference(T_world_laser, predicted)
         step = -np.linalg.solve(information + o.prior, slope)
         for share in SHARES:
-            tried = pose + share * step
+            tried = T_world_laser + share * step
             tried[2] = so2.wrap(tried[2])
             then = float(o.cost(tried)[0])
             if then < now:
                 break
         if then >= now or np.abs(share * step).max() < FINE:
-            return Match(pose, information, inliers, iteration, "converged")
-        pose, now = tried, then
-    return Match(pose, information, inliers, c.iterations, "no convergence")
+            return Match(T_world_laser, information, inliers, iteration, "converged")
+        T_world_laser, now = tried, then
+    return Match(T_world_laser, information, inliers, c.iterations, "no convergence")
 
 
 def _difference(a: Array, b: Array) -> Array:

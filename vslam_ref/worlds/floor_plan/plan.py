@@ -99,17 +99,17 @@ class Box:
     ----------
     size : tuple of two floats
         Along its own x and y, metres.
-    pose : Schedule
+    T_world_box : Schedule
         Poses (x, y, theta) of its middle.
     """
 
     size: tuple[float, float]
-    pose: Schedule
+    T_world_box: Schedule
 
     def corners(self, t: float) -> Array:
         """Corners (4, 2) at time t, anticlockwise."""
         half = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * np.array(self.size) / 2
-        return se2.act(self.pose.at(t), half)
+        return se2.act(self.T_world_box.at(t), half)
 
     def segments(self, t: float) -> Array:
         """Its sides (4, 4) at time t."""
