@@ -40,27 +40,24 @@ class MapConfig:
     def __post_init__(self) -> None:
         """Check the numbers."""
         Lattice(self.resolution)
-        if not (self.usable_range > 0 and math.isfinite(self.usable_range)):
-            raise ValueError(f"usable_range={self.usable_range!r} m: must be positive and finite")
-        if self.no_return not in ("ignore", "free"):
-            raise ValueError(f"no_return={self.no_return!r}: must be 'ignore' or 'free'")
-        if self.d_memory not in ("formula", "text"):
-            raise ValueError(f"d_memory={self.d_memory!r}: must be 'formula' or 'text'")
         self.sensor.steps(self.d_high_where)
-        if not 0 <= self.explained_by <= 10:
-            raise ValueError(f"explained_by={self.explained_by!r} cells: must be between 0 and 10")
-        if self.settle_seconds is not None and not self.settle_seconds > 0:
-            raise ValueError(f"settle_seconds={self.settle_seconds!r}: must be positive, or None for never")
-        if self.settle_in_line is not None and not self.settle_in_line >= 0:
-            raise ValueError(f"settle_in_line={self.settle_in_line!r}: must be 0 s or more, or None")
-        if not 0 <= self.graze <= 100:
-            raise ValueError(f"graze={self.graze!r} cells: must be between 0 and 100")
-        for name in ("d_lifetime", "hit_gap"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name}={getattr(self, name)!r} s: must be positive")
-        for name, least in (("s_most", 0.9), ("d_most", 0.9)):
-            if not least < getattr(self, name) < 1:
-                raise ValueError(f"{name}={getattr(self, name)!r}: must lie between {least:g} and 1")
+        settle, in_line = self.settle_seconds, self.settle_in_line
+        needs = {
+            "usable_range": (0 < self.usable_range < math.inf, "positive and finite, m"),
+            "no_return": (self.no_return in ("ignore", "free"), "'ignore' or 'free'"),
+            "d_memory": (self.d_memory in ("formula", "text"), "'formula' or 'text'"),
+            "explained_by": (0 <= self.explained_by <= 10, "between 0 and 10 cells"),
+            "settle_seconds": (settle is None or settle > 0, "positive, s, or None for never"),
+            "settle_in_line": (in_line is None or in_line >= 0, "0 s or more, or None"),
+            "graze": (0 <= self.graze <= 100, "between 0 and 100 cells"),
+            "d_lifetime": (self.d_lifetime > 0, "positive, s"),
+            "hit_gap": (self.hit_gap > 0, "positive, s"),
+            "s_most": (0.9 < self.s_most < 1, "between 0.9 and 1"),
+            "d_most": (0.9 < self.d_most < 1, "between 0.9 and 1"),
+        }
+        for name, (met, need) in needs.items():
+            if not met:
+                raise ValueError(f"{name}={getattr(self, name)!r}: must be {need}")
 
 
 AS_PRINTED = MapConfig(explained_by=0, settle_seconds=None)

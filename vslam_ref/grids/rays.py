@@ -10,10 +10,9 @@ height is n/d with integers n and d; the quotient is rounded, but its floor and 
 long as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last
 place of m is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
 
-How it is done without sorting.  Each beam is mirrored to run to the right and upwards, and walked along
-the axis on which it is longer.  It crosses its first cell, its last one, and the two cells beside each line
-between columns that it meets: both lie in the row n/d rounded down.  In a corner, where n/d is an integer,
-only the right one does.
+How it is done.  Each beam is mirrored to run to the right and upwards, and walked along the axis on which it
+is longer.  It crosses its first cell, its last one, and the two cells beside each line between columns that
+it meets: both lie in the row n/d rounded down.  In a corner, where n/d is an integer, only the right one.
 """
 
 from __future__ import annotations
@@ -123,9 +122,7 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
 
     Parameters
     ----------
-    start : array_like, shape (2,)
-        (x, y) in cells.
-    ends : array_like, shape (B, 2)
+    start, ends : array_like, shapes (2,), (B, 2)
         (x, y) in cells.
 
     Raises
@@ -135,8 +132,7 @@ def crossed_cells(start: ArrayLike, ends: ArrayLike) -> Crossings:
 
     Notes
     -----
-    The cell in which a beam ends is among them only if a part of positive length lies in it: a beam
-    that runs to the right and ends on the left edge of a cell does not cross that cell.
+    A beam that runs to the right and ends on the left edge of a cell does not cross that cell.
 
     Examples
     --------
@@ -286,9 +282,7 @@ def look(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> Look:
 
     Parameters
     ----------
-    shape : tuple of two ints
-    beams : BeamsInCells
-    graze : int
+    shape, beams, graze
         As for :func:`mark_beams`.
 
     Raises

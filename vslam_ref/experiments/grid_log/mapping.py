@@ -16,6 +16,7 @@ from vslam_ref.grids import MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.clusters import Clusters, TrackConfig, Tracker, find_clusters
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid, entropy_bits
+from vslam_ref.grids.scan import unit_vectors
 from vslam_ref.support.config import assume
 
 
@@ -108,7 +109,7 @@ def bounds(log: CarmenLog, usable_range: float, resolution: float, no_return: st
         used = (ranges > 0) & ((ranges < log.scanner.max_range) | (no_return == "free"))
         angles = T_world_laser[2] + log.scanner.angles[used]
         length = np.minimum(ranges[used], usable_range)[:, None]
-        ends = T_world_laser[:2] + length * np.stack([np.cos(angles), np.sin(angles)], 1)
+        ends = T_world_laser[:2] + length * unit_vectors(angles)
         points = np.vstack([T_world_laser[:2], ends])
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     try:

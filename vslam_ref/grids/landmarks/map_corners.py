@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
+from vslam_ref.grids.scan import unit_vectors
 from vslam_ref.support.config import assume
 
 
@@ -34,13 +35,8 @@ class MapCornerConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (
-            self.smooth > 0
-            and self.window > 0
-            and self.least > 0
-            and 0.5 < self.decided < 1
-            and self.near >= 0
-        ):
+        lengths = (self.smooth, self.window, self.least)
+        if not (min(lengths) > 0 and 0.5 < self.decided < 1 and self.near >= 0):
             raise ValueError("need smooth, window, least > 0, 0.5 < decided < 1 and near >= 0")
 
 
@@ -136,17 +132,13 @@ def static_along_arms(grid: LogOddsGrid, xy: ArrayLike, arms: ArrayLike, length:
     """
     from scipy.ndimage import maximum_filter
 
-    xy, arms = (
-        np.asarray(xy, dtype=np.float64).reshape(-1, 2),
-        np.asarray(arms, dtype=np.float64).reshape(-1, 2),
-    )
+    xy, arms = (np.asarray(a, dtype=np.float64).reshape(-1, 2) for a in (xy, arms))
     if len(xy) == 0 or grid.log_odds.size == 0:
         return np.zeros(len(xy))
     s = np.arange(grid.resolution, length + 1e-9, grid.resolution / 2)
-    way = np.stack([np.cos(arms), np.sin(arms)], -1)
+    way = unit_vectors(arms)
     places = xy[:, None, None] + s[:, None] * way[:, :, None]
     best = LogOddsGrid(grid.lattice, maximum_filter(grid.log_odds, size=3))
-    decided = np.log(0.9 / 0.1)
-    static = (best.at(places.reshape(-1, 2)) > decided).reshape(len(xy), 2, len(s))
+    static = (best.at(places.reshape(-1, 2)) > DECIDED_LOG_ODDS).reshape(len(xy), 2, len(s))
     share: Array = static.mean(axis=2).min(axis=1)
     return share

@@ -183,14 +183,9 @@ def match_scan(
     c = MatchConfig() if config is None else config
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     predicted, cov = np.asarray(predicted, dtype=np.float64), np.asarray(cov, dtype=np.float64)
-    if (
-        predicted.shape != (3,)
-        or cov.shape != (3, 3)
-        or not (np.isfinite(predicted).all() and np.isfinite(cov).all())
-    ):
-        raise ValueError(
-            f"prediction {predicted.shape} and covariance {cov.shape}: need finite (3,) and (3, 3)"
-        )
+    shapes = predicted.shape, cov.shape
+    if shapes != ((3,), (3, 3)) or not (np.isfinite(predicted).all() and np.isfinite(cov).all()):
+        raise ValueError(f"prediction {shapes[0]} and covariance {shapes[1]}: need finite (3,) and (3, 3)")
     o = Objective(field, points, predicted, np.linalg.inv(cov), c.sigma, c.cut)
     T_world_laser = correlative(o._replace(cut=c.search_cut), c)
     now = float(o.cost(T_world_laser)[0])

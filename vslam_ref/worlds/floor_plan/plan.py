@@ -233,17 +233,9 @@ def office() -> FloorPlan:
                (11.55, 6.05, 5, 0.7))  # fmt: skip
     gates = tuple(Gate(zone, (x, y + d), (x, y - d), i) for i, (x, y, zone, d) in enumerate(middles))
     route = np.array(
-        [
-            [1.5, 1.5],
-            [3.55, 1.5],
-            [3.55, 5.05],
-            [10.55, 5.05],
-            [10.55, 2.5],
-            [10.55, 5.05],
-            [7.05, 5.05],
-            [7.05, 7.5],
-        ]
-    )
+        [[1.5, 1.5], [3.55, 1.5], [3.55, 5.05], [10.55, 5.05],
+         [10.55, 2.5], [10.55, 5.05], [7.05, 5.05], [7.05, 7.5]]
+    )  # fmt: skip
     return FloorPlan(walls, zones, route, furniture, (chair,), doors, gates)
 
 
