@@ -68,15 +68,16 @@ class Canvas:
             raise ValueError(f"pose {T_world_laser!r}: need three finite numbers x, y, theta")
         beams = sort_beams(scan, self._usable_range, self._no_return_is_free)
         ends_world = pose[:2] + beams.lengths[:, None] * unit_vectors(pose[2] + beams.angles)
-        self.reserve(np.vstack([ends_world, pose[:2]]))
+        points = np.vstack([pose[:2], ends_world])
+        self.reserve(points)
         backward = scan.time <= self.time
         self.time = math.nextafter(self.time, math.inf) if backward else float(scan.time)
         self.scans += 1
         self.backward_stamps += backward
         self.beams = self.beams.plus(beams.counts)
         if len(beams.lengths):
-            start, ends = (self.lattice.lattice_from_world(xy) for xy in (pose[:2], ends_world))
-            self._draw(BeamsInCells(start, ends, beams.hit))
+            in_cells = self.lattice.lattice_from_world(points)
+            self._draw(BeamsInCells(in_cells[0], in_cells[1:], beams.hit))
         return ScanReport(beams.counts, backward)
 
     def _draw(self, beams: BeamsInCells) -> None:

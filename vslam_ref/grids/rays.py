@@ -184,6 +184,9 @@ def _cut(w: Walks, columns: IntArray) -> Walks:
 def mark_beams(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> NDArray[np.uint8]:
     """Return what a scan says of a window (rows, columns): MISS where beams cross, HIT at their ends.
 
+    A cell in which one beam ends and which another crosses is a HIT: the scan is one observation,
+    and the thing need not fill the cell.  A cell that one beam grazes and another misses is a MISS.
+
     Parameters
     ----------
     shape : tuple of two ints
@@ -197,11 +200,6 @@ def mark_beams(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> N
     -------
     ndarray of uint8, shape (rows, columns)
         UNSEEN, GRAZE, MISS or HIT.
-
-    Notes
-    -----
-    A cell in which one beam ends and which another crosses is a HIT: the scan is one observation,
-    and the thing need not fill the cell.  A cell that one beam grazes and another misses is a MISS.
     """
     start, ends, hit = beams
     w = walks(start, ends)
@@ -269,13 +267,6 @@ class Look(NamedTuple):
     columns: slice
     window: NDArray[np.uint8]
 
-    @property
-    def cells(self) -> tuple[IntArray, IntArray, NDArray[np.uint8]]:
-        """Rows and columns (n,) in the map of the cells that were looked at, and what was seen in each."""
-        looked_at = np.flatnonzero(self.window)  # in two dimensions ten times slower
-        row, column = np.divmod(looked_at, self.window.shape[1])
-        return row + self.rows.start, column + self.columns.start, self.window.reshape(-1)[looked_at]
-
 
 def look(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> Look:
     """Return what a scan says of a map of ``shape`` (rows, columns), in its bounding window.
@@ -300,3 +291,13 @@ def look(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> Look:
     inside = beams._replace(start=start - low, ends=ends - low)
     window = mark_beams((int(high[1] - low[1]), int(high[0] - low[0])), inside, graze)
     return Look(slice(low[1], high[1]), slice(low[0], high[0]), window)
+
+
+def looked_at(
+    shape: tuple[int, int], beams: BeamsInCells, graze: int = 0
+) -> tuple[IntArray, IntArray, NDArray[np.uint8]]:
+    """Rows and columns (n,) of the cells that a scan looks at, and what it says of each; as :func:`look`."""
+    rows, columns, window = look(shape, beams, graze)
+    where = np.flatnonzero(window)  # in two dimensions ten times slower
+    row, column = np.divmod(where, window.shape[1])
+    return row + rows.start, column + columns.start, window.reshape(-1)[where]

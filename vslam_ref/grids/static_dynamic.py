@@ -191,7 +191,7 @@ def apply_scan(layers: Layers, columns: int, beams: rays.BeamsInCells, rules: Ru
         As :func:`vslam_ref.grids.rays.look`; nothing is changed then.
     """
     rows = len(layers.static) // columns
-    row, column, what = rays.look((rows, columns), beams, rules.graze).cells
+    row, column, what = rays.looked_at((rows, columns), beams, rules.graze)
     at = row * columns + column
     S, D, seen, last_hit, since = (layer[at] for layer in layers)
     state = states(S)  # S_{t-1} chooses the row of the table
