@@ -125,7 +125,7 @@ class Track:
     velocity: Array = field(default_factory=lambda: np.zeros(2))
 
     def predicted(self, time: float) -> Array:
-        """Where the thing is at ``time`` if it goes on as it did."""
+        """Where the thing is (2,) at ``time``, s, if it goes on as it did; world, metres."""
         return self.places[-1] + self.velocity * (time - self.times[-1])
 
 

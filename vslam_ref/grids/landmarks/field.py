@@ -140,3 +140,10 @@ def scan_residuals_with_jacobians(
     J_pose = np.concatenate([at.slope, turn[..., None]], -1)
     J_point = at.slope[..., None, :] @ so2.exp(T_world_laser[..., 2])
     return Residuals(at.value[..., None], J_pose[..., None, :], J_point)
+
+
+def pose_difference(a: ArrayLike, b: ArrayLike) -> Array:
+    """Difference a - b (..., 3) of poses (x, y, theta), metres and radians, the angle in (-pi, pi]."""
+    off = np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64)
+    off[..., 2] = so2.wrap(off[..., 2])
+    return off

@@ -48,7 +48,7 @@ class MapCorners(NamedTuple):
 
 
 def certainty(grid: LogOddsGrid) -> Array:
-    """Q = max(2 P - 1, 0) of every cell: how sure it is that the cell is occupied."""
+    """Q = max(2 P - 1, 0) of every cell (rows, columns): how sure it is that the cell is occupied."""
     return np.maximum(2.0 * grid.probability - 1.0, 0.0)
 
 

@@ -20,7 +20,12 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Tukey
 from vslam_ref.geometry import se2, so2
-from vslam_ref.grids.landmarks.field import DistanceField, sample, scan_residuals_with_jacobians
+from vslam_ref.grids.landmarks.field import (
+    DistanceField,
+    pose_difference,
+    sample,
+    scan_residuals_with_jacobians,
+)
 from vslam_ref.support.config import assume
 
 FINE = 1e-4
@@ -77,7 +82,9 @@ class Match(NamedTuple):
 
 
 def thin(points: ArrayLike, side: float) -> Array:
-    """Mean of the points in each square of the given side: readings that share a cell share its error.
+    """Mean (k, 2) of the points (n, 2) in each square of the given side, metres.
+
+    Readings that share a cell share its error.
 
     Examples
     --------
@@ -129,8 +136,7 @@ class Objective(NamedTuple):
         poses = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
         world = se2.act(poses[:, None], self.points)
         d = sample(world, self.field)
-        off = poses - self.predicted
-        off[:, 2] = so2.wrap(off[:, 2])
+        off = pose_difference(poses, self.predicted)
         misfit = self.loss.cost(d).sum(axis=1) / self.sigma**2
         total: Array = misfit + 0.5 * np.einsum("ki,ij,kj->k", off, self.prior, off)
         return total
@@ -197,7 +203,7 @@ def match_scan(
         if inliers < c.least_points:
             return Match(predicted.copy(), np.zeros((3, 3)), inliers, iteration, "too few points on the map")
         information = (J * weight[:, None]).T @ J / c.sigma**2
-        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ _difference(T_world_laser, predicted)
+        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ pose_difference(T_world_laser, predicted)
         step = -np.linalg.solve(information + o.prior, slope)
         for share in SHARES:
             tried = T_world_laser + share * step
@@ -209,10 +215,3 @@ def match_scan(
             return Match(T_world_laser, information, inliers, iteration, "converged")
         T_world_laser, now = tried, then
     return Match(T_world_laser, information, inliers, c.iterations, "no convergence")
-
-
-def _difference(a: Array, b: Array) -> Array:
-    """A - b, the angle in (-pi, pi]."""
-    off = a - b
-    off[2] = so2.wrap(off[2])
-    return off

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array
 from vslam_ref.filters.block_covariance import Blocks, move_means, whitened
 from vslam_ref.geometry import so2
+from vslam_ref.grids.landmarks.field import pose_difference
 
 WEAKEST = 1e-6
 """Eigenvalues below this share of the largest say nothing."""
@@ -46,8 +47,7 @@ def pose_measurement(
     variance : ndarray, shape (k,)
     """
     A, P = np.asarray(information, dtype=np.float64), np.asarray(cov, dtype=np.float64)
-    off = np.asarray(T_world_laser, dtype=np.float64) - np.asarray(predicted, dtype=np.float64)
-    off[2] = so2.wrap(off[2])
+    off = pose_difference(T_world_laser, predicted)
     values, vectors = np.linalg.eigh((A + A.T) / 2)
     known = values > WEAKEST * max(float(values.max()), 0.0)
     known &= values > 0.0

@@ -38,7 +38,7 @@ class Schedule(NamedTuple):
     values: Array
 
     def at(self, t: float) -> Array:
-        """Value at time t."""
+        """Value (...,) at time t, s."""
         i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 1))
         j = min(i + 1, len(self.times) - 1)
         if i == j or t <= self.times[0]:
@@ -56,7 +56,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(times: ArrayLike, values: ArrayLike) -> Schedule:
-    """Build a :class:`Schedule`; ``ValueError`` if times do not increase or the lengths differ."""
+    """Build a :class:`Schedule` of times (k,), s, and values (k, ...); ``ValueError`` if times do not increase."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or len(t) == 0 or len(t) != len(v) or not np.isfinite(t).all() or np.any(np.diff(t) <= 0):
         raise ValueError(
