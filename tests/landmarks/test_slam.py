@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -186,6 +187,22 @@ def test_starts_that_mean_nothing_are_refused(start: list[float]) -> None:
 def test_the_first_increment_is_none(hall: HallRun) -> None:
     assert increment_of(hall.recording, 0) is None
     assert scan_of(hall.recording, 3).time == pytest.approx(0.6)
+
+
+def test_following_a_recording_is_step_after_step(hall: HallRun) -> None:
+    """The same increments and scans, put together from the recording's arrays by hand."""
+    first = 15
+    slam = GridSlam(hall.recording.T_world_robot[0], hall.slam.config)
+    poses = slam.follow(itertools.islice(hall.recording.way(), first))
+    np.testing.assert_array_equal(poses, hall.poses[:first])
+    for k, (increment, scan) in enumerate(itertools.islice(hall.recording.way(), first)):
+        assert scan.time == hall.recording.times[k]
+        np.testing.assert_array_equal(scan.ranges, hall.recording.ranges[k])
+        assert (increment is None) == (k == 0)
+        if increment is not None:
+            moved = [float(increment.ds[0]), float(increment.dalpha[0])]
+            assert moved == hall.recording.odometry.increment[k - 1].tolist()
+            np.testing.assert_array_equal(increment.cov[0], hall.recording.odometry.cov[k - 1])
 
 
 def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:

@@ -19,6 +19,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from vslam_ref.arrays import Array
 from vslam_ref.geometry import so2
@@ -38,21 +39,18 @@ class Corner(NamedTuple):
 
 def corner(runs: tuple[Array, Array], sigma: float, floor: float) -> Corner:
     """Corner of two straight runs of points (n, 2), with the standard deviation of a range, in metres."""
-    N, right, turned, var = np.empty((2, 2)), np.empty(2), [], []
-    for i, points in enumerate(runs):
+    lines = []
+    for points in runs:
         c = points.mean(axis=0)
         (S_xx, S_xy), (_, S_yy) = (points - c).T @ (points - c)
         phi = 0.5 * math.atan2(2 * S_xy, S_xx - S_yy)
         t, n = np.array([math.cos(phi), math.sin(phi)]), np.array([-math.sin(phi), math.cos(phi)])
-        N[i], right[i] = n, n @ c
-        turned.append((t, c))
-        var.append(
-            (sigma**2 / len(points), sigma**2 / sum((t @ (x - c)) ** 2 for x in points))
-        )  # eq-line-variances
-    N_inv = np.linalg.inv(N)
-    X = N_inv @ right  # eq-corner-crossing
-    lever = [t @ (X - c) for t, c in turned]
-    D = np.diag([var[i][0] + lever[i] ** 2 * var[i][1] for i in range(2)])
+        s = (points - c) @ t
+        var_offset, var_phi = sigma**2 / len(points), sigma**2 / (s @ s)  # eq-line-variances
+        lines.append((c, t, n, var_offset, var_phi))
+    N_inv = np.linalg.inv(np.array([n for _, _, n, _, _ in lines]))
+    X = N_inv @ [n @ c for c, _, n, _, _ in lines]  # eq-corner-crossing
+    D = np.diag([v_o + (t @ (X - c)) ** 2 * v_phi for c, t, _, v_o, v_phi in lines])
     return Corner(X, N_inv @ D @ N_inv.T + floor**2 * np.eye(2))  # eq-corner-cov
 
 
@@ -82,9 +80,8 @@ def corner_of_map(
 
 def static_share(P_S: Array, side: float, xy: Array, arm: float) -> float:
     """Share of the places along an arm of a corner, up to 0.3 m, beside which S has decided a cell."""
-    places = [
-        xy + s * np.array([math.cos(arm), math.sin(arm)]) for s in np.arange(side, 0.3 + 1e-9, side / 2)
-    ]
+    way = np.array([math.cos(arm), math.sin(arm)])
+    places = [xy + s * way for s in np.arange(side, 0.3 + 1e-9, side / 2)]
     cells = [(math.floor(y / side), math.floor(x / side)) for x, y in places]
     return float(np.mean([P_S[i - 1 : i + 2, j - 1 : j + 2].max() > 0.9 for i, j in cells]))
 
@@ -133,11 +130,9 @@ def localise(
     seen = [(z, *observe(x, j)) for z, j in zip(corners, which, strict=True) if j >= 0]
     if not seen:
         return x, P, which
-    cov = np.zeros((2 * len(seen), 2 * len(seen)))
-    for k, (z, _, _) in enumerate(seen):
-        cov[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = z.cov
+    H = np.concatenate([H for _, _, H in seen])
     innovation = np.concatenate([z.xy - h for z, h, _ in seen])
-    return *update(x, P, np.concatenate([H for _, _, H in seen]), innovation, cov), which
+    return *update(x, P, H, innovation, block_diag(*(z.cov for z, _, _ in seen))), which
 
 
 class Floor:

@@ -56,7 +56,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(times: ArrayLike, values: ArrayLike) -> Schedule:
-    """Build a :class:`Schedule` of times (k,), s, and values (k, ...); ``ValueError`` if times do not increase."""
+    """Build a :class:`Schedule` of times (k,), s, that must increase, and values (k, ...)."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or len(t) == 0 or len(t) != len(v) or not np.isfinite(t).all() or np.any(np.diff(t) <= 0):
         raise ValueError(
