@@ -90,7 +90,8 @@ def test_a_run_writes_its_maps_film_numbers_and_page(
     }
     printed = capsys.readouterr().out
     assert f"{numbers['entropy']:.4g}" in printed
-    assert re.search(rf"backend +{_kernels.backend()}", printed)
+    assert re.search(rf"backend:? +{_kernels.backend()}", printed)
+    assert numbers["backend"] == _kernels.backend()
     assert "report.html" in printed
     page = (out / "report.html").read_text()
     assert "http" not in page

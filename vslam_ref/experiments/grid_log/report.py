@@ -49,7 +49,6 @@ ROWS = (
     ("entropy_plain", "mean entropy of the plain grid", "bit"),
     ("seconds", "time for S and D", "s"),
     ("scans_per_s", "scans per second", "1/s"),
-    ("backend", "backend", ""),
 )
 """Key in the JSON, words and unit in the table."""
 
