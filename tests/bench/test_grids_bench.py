@@ -28,9 +28,7 @@ def test_bresenham_is_the_line_and_its_cells_are_near_the_beams() -> None:
 def test_peer_and_library_see_the_same_room() -> None:
     angles, ranges = grids.room()
     theirs = grids.peer((ranges * np.cos(angles)).tolist(), (ranges * np.sin(angles)).tolist())
-    start, ends, hit = grids.scan_in_cells()
-    window = np.zeros((grids.CELLS, grids.CELLS), np.uint8)
-    rays.mark_beams(window, start, ends, hit)
+    window = rays.mark_beams((grids.CELLS, grids.CELLS), grids.scan_in_cells())
     free = theirs.T == 0.0  # theirs has x first
     ours = window == rays.MISS
     # theirs moves ends by half a cell and leaves the line by half a cell: every cell of theirs is a neighbour

@@ -13,7 +13,7 @@ pytest.importorskip("cv2", reason="pictures need OpenCV")
 
 import cv2
 
-from vslam_ref.datasets import grid_files, video
+from vslam_ref.datasets import grid_files
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds, states
@@ -89,22 +89,3 @@ def test_what_is_no_yaml_is_refused(tmp_path: Path, content: bytes, what: str) -
     (tmp_path / "m.yaml").write_bytes(content)
     with pytest.raises(FormatError, match=what):
         grid_files.read_ros_map(tmp_path / "m.yaml")
-
-
-def test_a_video_has_its_pictures(tmp_path: Path) -> None:
-    """Colours survive to what a lossy codec of 8 bits does to flat areas: within 12 of 255."""
-    path = tmp_path / "a.mp4"
-    picture = np.zeros((33, 48, 3), np.uint8)
-    picture[:, :24] = (200, 40, 20)  # red; in OpenCV's order it would be blue
-    with video.mp4(path) as film:
-        for _ in range(5):
-            film(picture)
-        with pytest.raises(ValueError, match="all must have one size"):
-            film(picture[:20])
-    reader = cv2.VideoCapture(str(path))
-    frames = []
-    while (got := reader.read())[0]:
-        frames.append(got[1])
-    assert len(frames) == 5
-    assert frames[0].shape == (34, 48, 3)
-    assert np.abs(frames[2][10, 8, ::-1].astype(int) - [200, 40, 20]).max() <= 12

@@ -63,7 +63,7 @@ def test_the_density_is_the_share_of_floor_under_bodies() -> None:
 
 
 def test_people_stay_on_the_floor_and_off_the_robot(office_run: Recording) -> None:
-    people, poses = office_run.people, office_run.poses
+    people, poses = office_run.people, office_run.T_world_robot
     assert ((people > 0.05) & (people < [14.05, 10.05])).all()
     assert np.hypot(*(people - poses[:, None, :2]).transpose(2, 0, 1)).min() > 0.55 - 1e-9
     # no one walks through a wall that does not move between two scans
@@ -151,7 +151,7 @@ def test_beyond_the_maximum_range_nothing_returns() -> None:
     assert recording.exact_ranges[np.isfinite(recording.exact_ranges)].max() <= 2.0
     np.testing.assert_array_equal(recording.owner == -1, np.isinf(recording.exact_ranges))
     # a beam that meets nothing crosses its last cell, too
-    cells, pose = cover(recording), recording.poses[0]
+    cells, pose = cover(recording), recording.T_world_robot[0]
     seen, free = seen_cells(recording, 0, cells), np.isinf(recording.exact_ranges[0])
     angles = pose[2] + recording.angles[free]
     last = pose[:2] + (2.0 - 1e-9) * np.stack([np.cos(angles), np.sin(angles)], 1)
@@ -174,8 +174,8 @@ def test_a_turned_world_gives_the_same_ranges(office_run: Recording) -> None:
     from vslam_ref.worlds.floor_plan import cast
 
     moved, k = turned(office_run, 0.7), 40
-    angles = moved.poses[k, 2] + moved.angles
-    again = cast(moved.poses[k, :2], angles, moved.segments[k], moved.discs[k]).range
+    angles = moved.T_world_robot[k, 2] + moved.angles
+    again = cast(moved.T_world_robot[k, :2], angles, moved.segments[k], moved.discs[k]).range
     near = np.isfinite(moved.exact_ranges[k])
     # a rim that a beam grazes turns rounding into its square root
     off = np.abs(again[near] - moved.exact_ranges[k, near])
@@ -191,7 +191,7 @@ def test_carts_keep_off_the_route_and_each_other() -> None:
     carts = recording.plan.things
     assert len(carts) == 5
     for t in np.linspace(0.0, 60.0, 40):
-        middles = np.array([cart.pose.at(t)[:2] for cart in carts])
+        middles = np.array([cart.T_world_box.at(t)[:2] for cart in carts])
         apart = np.hypot(*(middles[:, None] - middles).transpose(2, 0, 1)) + 9 * np.eye(5)
         assert apart.min() > np.hypot(0.8, 0.5)  # circles around two carts do not meet
     with pytest.raises(ValueError, match="no free straight line"):
@@ -258,7 +258,8 @@ def test_poses_and_segments_share_one_world(hall_run: Recording) -> None:
     k = 4
     angles = hall_run.angles
     ends = se2.act(
-        hall_run.poses[k], hall_run.exact_ranges[k][:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+        hall_run.T_world_robot[k],
+        hall_run.exact_ranges[k][:, None] * np.stack([np.cos(angles), np.sin(angles)], 1),
     )
     on = (np.abs(ends[:, :1] - [0.05, 6.05]) < 1e-9).any(axis=1) | (
         np.abs(ends[:, 1:] - [0.05, 5.05]) < 1e-9

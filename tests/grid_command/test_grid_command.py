@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ pytest.importorskip("cv2", reason="pictures and films need OpenCV")
 
 import cv2
 
-from vslam_ref import cli
+from vslam_ref import _kernels, cli
 from vslam_ref.datasets import carmen, catalogue, grid_files
 from vslam_ref.experiments.grid_log.mapping import GridConfig, bounds, map_log
 from vslam_ref.grids import AS_PRINTED, MapConfig, PlainMap, StaticDynamicMap
@@ -21,7 +22,7 @@ from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
 FOLDER = catalogue.find("carmen_2d")
 needs_logs = pytest.mark.skipif(FOLDER is None, reason="carmen_2d is not in VSLAM_REF_DATA")
 KEYS = {"scans", "backward_stamps", "beams", "cells", "seconds", "scans_per_s", "entropy", "dynamic_cells"}
-KEYS |= {"dynamic_objects"}
+KEYS |= {"dynamic_objects", "backend"}
 
 
 def room(path: Path, scans: int = 60, far: float | None = None) -> Path:
@@ -85,14 +86,17 @@ def test_a_run_writes_its_maps_film_numbers_and_page(
     names = {"static", "dynamic", "plain"}
     assert {p.name for p in out.iterdir()} == {
         *(f"{n}.{s}" for n in names for s in ("png", "yaml")),
-        *("maps.npz", "maps.png", "maps.svg", "tracks.csv", "result.json", "report.html", "animation.mp4"),
+        *("maps.npz", "maps.png", "maps.svg", "tracks.csv", "result.json", "report.html", "animation.webm"),
     }
     printed = capsys.readouterr().out
     assert f"{numbers['entropy']:.4g}" in printed
+    assert re.search(rf"backend:? +{_kernels.backend()}", printed)
+    assert numbers["backend"] == _kernels.backend()
     assert "report.html" in printed
     page = (out / "report.html").read_text()
     assert "http" not in page
     assert "<script" not in page
+    assert '<video src="animation.webm" controls' in page
     data = np.load(out / "maps.npz", allow_pickle=False)
     assert set(data.files) >= {"log_odds_s", "log_odds_d", "origin_xy", "resolution", "times"}
     assert data["times"].tolist() == pytest.approx([round(0.2 * k, 3) for k in range(60)])
@@ -100,8 +104,9 @@ def test_a_run_writes_its_maps_film_numbers_and_page(
     assert static.log_odds.shape == data["log_odds_s"].shape
     np.testing.assert_allclose(static.origin_xy, data["origin_xy"], atol=1e-12)
     np.testing.assert_array_equal(static.states, np.sign(np.trunc(data["log_odds_s"] / np.log(9))) + 1)
-    film = cv2.VideoCapture(str(out / "animation.mp4"))
+    film = cv2.VideoCapture(str(out / "animation.webm"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == 60
+    assert int(film.get(cv2.CAP_PROP_FRAME_WIDTH)) == 320
     # the walker went along x = 2 at 1 m/s
     rows = np.genfromtxt(out / "tracks.csv", delimiter=",", names=True)
     speed = np.polyfit(rows["time_s"], rows["y_m"], 1)[0]
@@ -116,7 +121,7 @@ def test_resolution_and_settings_are_taken(tmp_path: Path) -> None:
     numbers = json.loads((tmp_path / "o" / "result.json").read_text())
     assert numbers["resolution"] == 0.2
     assert numbers["config"]["map.d_memory"] == "formula"
-    assert not (tmp_path / "o" / "animation.mp4").exists()
+    assert not (tmp_path / "o" / "animation.webm").exists()
 
 
 @pytest.mark.parametrize(
@@ -162,8 +167,9 @@ def test_bad_logs_are_one_line_with_their_line(tmp_path: Path, capsys: pytest.Ca
 def test_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
     log, out = room(tmp_path / "a.log", 8), tmp_path / "out"
     assert run(log, "--out", out) == 0
-    assert run(log, "--out", out, "--set", "video_frames=0") == 0
-    assert not (out / "animation.mp4").exists()
+    assert run(log, "--out", out, "--video", "none") == 0
+    assert not (out / "animation.webm").exists()
+    assert "<video" not in (out / "report.html").read_text()
 
 
 # -- real logs -------------------------------------------------------------------------------------

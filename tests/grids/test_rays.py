@@ -122,11 +122,11 @@ def test_length_of_the_beam_is_the_sum_over_its_cells() -> None:
     np.testing.assert_allclose(np.bincount(found.beam, last - first), 1.0, atol=1e-9)
 
 
-def beams(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def beams(rng: np.random.Generator, n: int) -> rays.BeamsInCells:
     start = np.round(rng.uniform(18, 22, 2) * 2) / 2
     ends = rng.uniform(3, 37, (n, 2))
     ends[::3] = np.round(ends[::3] * 2) / 2
-    return start, ends, rng.random(n) < 0.6
+    return rays.BeamsInCells(start, ends, rng.random(n) < 0.6)
 
 
 @pytest.mark.parametrize("graze", [0, 1, 3, 50])
@@ -137,8 +137,7 @@ def test_marks_are_the_crossed_cells_and_hits_win(
     """Grazed are the cells within ``graze`` of the last crossed one, along the beam's longer axis."""
     monkeypatch.setattr(rays, "GROUP", 7 if seed % 2 else rays.GROUP)  # more than one group
     start, ends, hit = beams(np.random.default_rng(seed), 150)
-    window = np.zeros((40, 40), np.uint8)
-    rays.mark_beams(window, start, ends, hit, graze)
+    window = rays.mark_beams((40, 40), rays.BeamsInCells(start, ends, hit), graze)
     expected = np.zeros((40, 40), np.uint8)
     for e, h in zip(ends, hit, strict=True):
         quantised = tuple(Fraction(int(np.rint(v * rays.QUANTA)), rays.QUANTA) for v in e)
@@ -160,8 +159,7 @@ def test_a_beam_within_its_first_column_beside_a_long_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start = np.rint(rng.uniform(18, 22, 2) * rays.QUANTA) / rays.QUANTA
     ends = np.rint(np.stack([start + rng.uniform(-0.9, 0.9, 2), [33.0, 4.0]]) * rays.QUANTA) / rays.QUANTA
-    window = np.zeros((40, 40), np.uint8)
-    rays.mark_beams(window, start, ends, np.zeros(2, dtype=bool))
+    window = rays.mark_beams((40, 40), rays.BeamsInCells(start, ends, np.zeros(2, dtype=bool)))
     crossed = [exact_cells(tuple(map(Fraction, start)), tuple(map(Fraction, e))) for e in ends]
     assert {tuple(c) for c in np.argwhere(window).tolist()} == crossed[0] | crossed[1]
 
@@ -172,12 +170,11 @@ def test_both_backends_visit_the_exact_cells(seed: int, backend: str) -> None:
     """A map of zeros, with the marks themselves as evidence, is the picture of the scan."""
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
-    start, ends, hit = beams(np.random.default_rng(seed), 70)
-    window = np.zeros((40, 40), np.uint8)
-    rays.mark_beams(window, start, ends, hit)
+    seen = beams(np.random.default_rng(seed), 70)
+    window = rays.mark_beams((40, 40), seen)
     picture = np.zeros(1600)
     with _kernels.use_backend(backend):
-        apply_plain(picture, 40, start, ends, hit, np.array([rays.MISS, rays.HIT], float), 9.0)
+        apply_plain(picture, 40, seen, np.array([rays.MISS, rays.HIT], float), 9.0)
     np.testing.assert_array_equal(picture.reshape(40, 40), window)
 
 
@@ -187,10 +184,9 @@ def test_beams_that_cannot_be_walked_are_refused(backend: str, bad: float) -> No
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     picture = np.zeros(100)
+    seen = rays.BeamsInCells(np.full(2, 5.0), np.array([[bad, 5.0]]), np.ones(1, bool))
     with _kernels.use_backend(backend), pytest.raises(ValueError, match="beam is not finite or spans"):
-        apply_plain(
-            picture, 10, np.full(2, 5.0), np.array([[bad, 5.0]]), np.ones(1, bool), np.array([1.0, 2.0]), 9.0
-        )
+        apply_plain(picture, 10, seen, np.array([1.0, 2.0]), 9.0)
     assert not picture.any()
 
 
@@ -200,10 +196,9 @@ def test_beams_that_leave_the_map_are_refused(backend: str, end: tuple[float, fl
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     picture = np.zeros(100)
+    seen = rays.BeamsInCells(np.full(2, 5.0), np.array([end]), np.ones(1, bool))
     with _kernels.use_backend(backend), pytest.raises(ValueError, match="a beam leaves the map"):
-        apply_plain(
-            picture, 10, np.full(2, 5.0), np.array([end]), np.ones(1, bool), np.array([1.0, 2.0]), 9.0
-        )
+        apply_plain(picture, 10, seen, np.array([1.0, 2.0]), 9.0)
     assert not picture.any()
 
 

@@ -24,6 +24,8 @@ import vslam_ref
 from vslam_ref import _kernels
 from vslam_ref.filters.block_covariance import State
 from vslam_ref.filters.vehicle import Increment
+from vslam_ref.grids.rays import BeamsInCells
+from vslam_ref.grids.static_dynamic import Layers, Rules
 
 from . import rows_bundle
 
@@ -136,16 +138,16 @@ def for_reduced_update(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return blocks(rng, B, 4, b * n), b, P_a, frame, *seen(rng, B, b * n, b, m), gate
 
 
-def for_grid(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+def for_grid(rng: Rng, B: int, n: int) -> BeamsInCells:
     """Beams in a map of 40 x 50 cells: start, ends (some on lines and corners) and hits."""
     start = rng.choice([rng.uniform(15, 25, 2), np.array([20.0, 20.0]), np.array([20.5, 20.0])])
     ends = rng.uniform(2, 38, (8 * n, 2))
     ends[::2] = np.round(ends[::2] * 2) / 2
-    return start, ends, rng.random(8 * n) < 0.7
+    return BeamsInCells(start, ends, rng.random(8 * n) < 0.7)
 
 
 def for_apply_plain(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
-    return rng.uniform(-3, 3, 2000), 50, *for_grid(rng, B, n), np.array([-0.8, 1.4]), 6.0
+    return rng.uniform(-3, 3, 2000), 50, for_grid(rng, B, n), np.array([-0.8, 1.4]), 6.0
 
 
 def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
@@ -153,11 +155,10 @@ def for_apply_scan(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     s, d = rng.uniform(-3, 3, (2, 2000))
     times = (rng.choice(t, 2000) for t in ([-np.inf, 7.0, 9.5], [-np.inf, 8.0, 9.5], [0.0, 5.0, 9.0]))
     steps = rng.uniform(-2, 2, (2, 3, 3))
-    settle, graze = rng.choice([3.0, np.inf]), rng.choice([0.0, 2.0])
-    limits = np.array(
-        [6.0, 3.0, rng.choice([-1.0, 1.0]), settle, 1.0, n % 2, rng.choice([0.5, settle]), graze]
-    )
-    return s, d, *times, 50, *for_grid(rng, B, n), *steps, limits, 10.0
+    settle, graze = rng.choice([3.0, np.inf]), int(rng.choice([0, 2]))
+    lifetime, in_line = rng.choice([-1.0, 1.0]), rng.choice([0.5, settle])
+    rules = Rules(*steps, 6.0, 3.0, lifetime, settle, in_line, 1.0, n % 2, graze)
+    return Layers(s, d, *times), 50, for_grid(rng, B, n), rules, 10.0
 
 
 INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
@@ -207,18 +208,17 @@ CASES = [(twin, build) for twin, builders in INPUTS.items() for build in builder
 
 def copies(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """Copies of what may be written to, with its strides; read-only views stay as they are."""
-    return tuple(
-        type(a)(*copies(a))
-        if isinstance(a, tuple)
-        else room_for(a)
-        if isinstance(a, np.ndarray) and a.flags.writeable
-        else a
-        for a in arguments
-    )
+
+    def copy(a: Any) -> Any:
+        if isinstance(a, tuple):  # a NamedTuple
+            return type(a)(*map(copy, a))
+        return room_for(a) if isinstance(a, np.ndarray) and a.flags.writeable else a
+
+    return tuple(map(copy, arguments))
 
 
-def flat(arguments: tuple[Any, ...]) -> list[Any]:
-    """The arguments, NamedTuples unpacked."""
+def fields(arguments: tuple[Any, ...]) -> list[Any]:
+    """Arguments, NamedTuples field by field."""
     return [part for a in arguments for part in (a if isinstance(a, tuple) else (a,))]
 
 
@@ -243,9 +243,9 @@ def test_twin_does_what_numpy_does(twin: str, build: Callable[..., tuple[Any, ..
     assert len(returned) == len(also)
     changed = 0
     for before, a, b in zip(
-        [*flat(arguments), *[None] * len(also)],
-        [*flat(expected), *returned],
-        [*flat(found), *also],
+        [*fields(arguments), *[None] * len(also)],
+        [*fields(expected), *returned],
+        [*fields(found), *also],
         strict=True,
     ):
         if not isinstance(a, np.ndarray):
@@ -275,11 +275,11 @@ def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, 
     arguments = build(np.random.default_rng(0), 2, 3)
     with _kernels.use_backend("numpy"):
         a, b = copies(arguments), copies(arguments)
-        flat(b)[0][...] += 1e-6
+        fields(b)[0][...] += 1e-6
         r, s = outputs(twin, function(*a)), outputs(twin, function(*b))
     pairs = [
         (np.nan_to_num(u), np.nan_to_num(v))
-        for u, v in zip([*flat(a), *r], [*flat(b), *s], strict=True)
+        for u, v in zip([*fields(a), *r], [*fields(b), *s], strict=True)
         if isinstance(u, np.ndarray) and u.dtype.kind in "fc"
     ]
     assert max(np.abs(u - v).max(initial=0.0) for u, v in pairs) > TOLERANCE * 100

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.geometry import se2
+from vslam_ref.grids import Scan
 from vslam_ref.grids.landmarks import (
     LandmarkConfig,
     Signature,
@@ -90,12 +91,14 @@ def test_only_beams_behind_both_arms_prove_that_it_left(left: float, right: floa
     ranges = np.where(BEAMS > 0, left, right)
     if np.isinf(left):
         ranges = np.full(len(BEAMS), 9.0)  # a reading at the maximum range
-    assert seen_through(POSE, place, arms, BEAMS, ranges, beyond=0.25).tolist() == [expected]
+    assert seen_through(POSE, place, arms, Scan(BEAMS, ranges, 10.0, 0.0), beyond=0.25).tolist() == [expected]
 
 
 def test_what_is_outside_of_the_view_is_not_seen_through() -> None:
     place = se2.act(POSE, [[-3.0, 0.0]])
-    assert not seen_through(POSE, place, [[0.0, 1.0]], BEAMS, np.full(len(BEAMS), 9.0), 0.25).any()
+    assert not seen_through(
+        POSE, place, [[0.0, 1.0]], Scan(BEAMS, np.full(len(BEAMS), 9.0), 10.0, 0.0), 0.25
+    ).any()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vslam_ref.grids import LogOddsGrid
+from vslam_ref.grids import LogOddsGrid, Scan
 from vslam_ref.grids.landmarks import Corners, LandmarkConfig, LandmarkMap
 
 POSE = np.array([0.0, 0.0, 0.0])
@@ -90,10 +90,12 @@ def test_when_a_landmark_is_withdrawn(
     assert len(marks.active) == 1
     far, near = np.full(len(BEAMS), 9.0), np.full(len(BEAMS), 1.0)
     now = grid if held else free
-    assert marks.check(5, POSE, place, BEAMS, near, now) == [], "somebody in front is no evidence"
+    assert marks.check(5, POSE, place, Scan(BEAMS, near, 10.0, 0.0), now) == [], (
+        "somebody in front is no evidence"
+    )
     for k in range(needed):
         assert len(marks.active) == 1
-        gone = marks.check(6 + k, POSE, place, BEAMS, far, now)
+        gone = marks.check(6 + k, POSE, place, Scan(BEAMS, far, 10.0, 0.0), now)
     assert [m.id for m in gone] == [0]
     assert gone[0].withdrawn == 5 + needed
     assert gone[0].why == ("seen through" if needed == 3 else "no longer static in S")
@@ -105,4 +107,4 @@ def test_a_reading_in_front_starts_the_count_anew(make_grid: Callable[..., LogOd
     marks = LandmarkMap()
     show(marks, grid, corners_at((2.05, 2.05)), np.zeros((0, 2)), 5)
     for k, r in enumerate((9.0, 9.0, 1.0, 9.0, 9.0)):
-        assert marks.check(6 + k, POSE, place, BEAMS, np.full(len(BEAMS), r), grid) == []
+        assert marks.check(6 + k, POSE, place, Scan(BEAMS, np.full(len(BEAMS), r), 10.0, 0.0), grid) == []

@@ -76,8 +76,8 @@ def test_a_match_finds_the_pose(make_grid: Callable[..., LogOddsGrid], off: list
     assert found.reason == "converged"
     assert found.inliers > 50
     # the prior pulls by a share of the offset, and thinned means lie a little inside of corners
-    np.testing.assert_allclose(found.pose[:2], pose[:2], atol=0.005)
-    assert abs(so2.wrap(found.pose[2] - pose[2])) < 0.003
+    np.testing.assert_allclose(found.T_world_laser[:2], pose[:2], atol=0.005)
+    assert abs(so2.wrap(found.T_world_laser[2] - pose[2])) < 0.003
 
 
 def test_a_third_of_the_beams_on_people_does_not_matter(make_grid: Callable[..., LogOddsGrid]) -> None:
@@ -87,7 +87,7 @@ def test_a_third_of_the_beams_on_people_does_not_matter(make_grid: Callable[...,
     bad = rng.uniform(size=len(points)) < 0.33
     points[bad] *= rng.uniform(0.2, 0.8, bad.sum())[:, None]
     found = match_scan(field, thin(points, 0.1), pose + [0.08, -0.05, 0.03], COV)
-    np.testing.assert_allclose(found.pose[:2], pose[:2], atol=0.01)
+    np.testing.assert_allclose(found.T_world_laser[:2], pose[:2], atol=0.01)
 
 
 def test_people_beside_a_wall_pull_only_without_the_cut(make_grid: Callable[..., LogOddsGrid]) -> None:
@@ -102,10 +102,10 @@ def test_people_beside_a_wall_pull_only_without_the_cut(make_grid: Callable[...,
     at_wall = np.flatnonzero(points[:, 1] > 1.5)  # the wall y = 4.05
     points[at_wall[::2], 1] -= 0.2
     kept = match_scan(field, points, pose, COV)
-    assert abs(kept.pose[1] - pose[1]) < 0.01
+    assert abs(kept.T_world_laser[1] - pose[1]) < 0.01
     plain = match_scan(field, points, pose, COV, MatchConfig(cut=np.inf, search_cut=np.inf))
     assert plain.reason == "converged"
-    assert plain.pose[1] - pose[1] > 0.03
+    assert plain.T_world_laser[1] - pose[1] > 0.03
 
 
 def test_a_narrow_search_loses_what_a_wide_one_finds(make_grid: Callable[..., LogOddsGrid]) -> None:
@@ -117,7 +117,7 @@ def test_a_narrow_search_loses_what_a_wide_one_finds(make_grid: Callable[..., Lo
     for off in rng.uniform(-1, 1, (20, 3)) * [0.2, 0.2, 0.1]:
         for cut in lost:
             found = match_scan(field, points, pose + off, COV, MatchConfig(search_cut=cut))
-            lost[cut] += bool(np.abs(found.pose[:2] - pose[:2]).max() > 0.02)
+            lost[cut] += bool(np.abs(found.T_world_laser[:2] - pose[:2]).max() > 0.02)
     assert lost[0.3] == 0
     assert lost[0.02] >= 3
 
@@ -130,18 +130,18 @@ def test_a_corridor_tells_nothing_of_the_way_along_it(make_grid: Callable[..., L
     # ends of the walls would fix the way along: keep what lies well inside of them
     points = points[np.abs(points[:, 0]) < 1.5]
     found = match_scan(field, points, pose + [0.1, 0.06, 0.03], COV)
-    H, _, _ = pose_measurement(found.pose, found.information, pose + [0.1, 0.06, 0.03], COV)
+    H, _, _ = pose_measurement(found.T_world_laser, found.information, pose + [0.1, 0.06, 0.03], COV)
     assert found.information[0, 0] < 1e-6 * found.information[1, 1]
     assert len(H) == 2, "two known directions of three"
-    assert found.pose[0] == pytest.approx(pose[0] + 0.1, abs=1e-3)
-    assert found.pose[1] == pytest.approx(pose[1], abs=0.005)
+    assert found.T_world_laser[0] == pytest.approx(pose[0] + 0.1, abs=1e-3)
+    assert found.T_world_laser[1] == pytest.approx(pose[1], abs=0.005)
 
 
 def test_without_a_map_nothing_moves(make_grid: Callable[..., LogOddsGrid]) -> None:
     field = distance_field(make_grid([]))
     found = match_scan(field, np.ones((50, 2)), [1.0, 2.0, 3.0], COV)
     assert found.reason == "too few points on the map"
-    np.testing.assert_array_equal(found.pose, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(found.T_world_laser, [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(found.information, 0.0)
     assert match_scan(field, np.zeros((0, 2)), [1.0, 2.0, 3.0], COV).reason == "too few points on the map"
 
@@ -228,9 +228,9 @@ def test_a_match_is_the_minimum_of_its_objective(make_grid: Callable[..., LogOdd
         predicted = pose + [0.06, 0.0, 0.0]
         found = match_scan(field, points, predicted, cov)
         o = Objective(field, points, predicted, np.linalg.inv(cov), MatchConfig().sigma, MatchConfig().cut)
-        least = minimize(lambda p, o=o: float(o.cost(p)[0]), found.pose, method="Nelder-Mead")
-        np.testing.assert_allclose(found.pose, least.x, atol=1e-3)
-        pulled.append(found.pose[0] - pose[0])
+        least = minimize(lambda p, o=o: float(o.cost(p)[0]), found.T_world_laser, method="Nelder-Mead")
+        np.testing.assert_allclose(found.T_world_laser, least.x, atol=1e-3)
+        pulled.append(found.T_world_laser[0] - pose[0])
     assert pulled[0] < 0.005
     assert pulled[0] < pulled[1] < pulled[2]
     assert pulled[2] > 0.02, "a prediction that is sure of itself must count"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -19,7 +20,7 @@ from .conftest import HallRun
 
 
 def rmse(run: HallRun, poses: np.ndarray) -> float:
-    return float(np.sqrt(((poses - run.recording.poses)[:, :2] ** 2).sum(axis=1).mean()))
+    return float(np.sqrt(((poses - run.recording.T_world_robot)[:, :2] ** 2).sum(axis=1).mean()))
 
 
 def test_the_robot_knows_where_it_is(hall: HallRun) -> None:
@@ -66,10 +67,10 @@ def test_least_squares_need_moving_beams_left_out() -> None:
         slam = GridSlam([2.31, 2.47, 0.0], config)
         for k in range(12):
             slam.step(still if k else None, Scan(angles, room, 10.0, 0.2 * k))
-        known = slam.pose
+        known = slam.T_world_robot
         for k in range(12, 15):
             slam.step(still, Scan(angles, people, 10.0, 0.2 * k))
-        off[leave_out, separate] = float(np.hypot(*(slam.pose - known)[:2]))
+        off[leave_out, separate] = float(np.hypot(*(slam.T_world_robot - known)[:2]))
     assert off[True, True] < 0.005
     assert off[False, True] > 0.02
     assert off[True, False] == off[False, False] > 0.02
@@ -152,11 +153,11 @@ def test_bad_input_is_refused_and_changes_nothing(
     slam = GridSlam([0.0, 0.0, 0.0])
     beams = np.linspace(-1, 1, 50)
     slam.step(None, Scan(beams, np.full(50, 3.0), 10.0, 0.0))
-    pose, layers = slam.pose, {k: v.copy() for k, v in slam.maps.layers.items()}
+    pose, layers = slam.T_world_robot, {k: v.copy() for k, v in slam.maps.layers.items()}
     cov = slam.filter.blocks.P_pp.copy()
     with pytest.raises(ValueError, match=words):
         slam.step(increment, scan)
-    np.testing.assert_array_equal(slam.pose, pose)
+    np.testing.assert_array_equal(slam.T_world_robot, pose)
     np.testing.assert_array_equal(slam.filter.blocks.P_pp, cov)
     for name, layer in layers.items():
         np.testing.assert_array_equal(slam.maps.layers[name], layer)
@@ -170,7 +171,7 @@ def test_scans_without_a_reading_only_drift() -> None:
     step = slam.step(
         Increment(np.array([0.1]), np.array([0.0]), 1e-4 * np.eye(2)[None]), empty._replace(time=0.2)
     )
-    np.testing.assert_allclose(step.pose, [1.0 + 0.1 * np.cos(0.5), 2.0 + 0.1 * np.sin(0.5), 0.5])
+    np.testing.assert_allclose(step.T_world_robot, [1.0 + 0.1 * np.cos(0.5), 2.0 + 0.1 * np.sin(0.5), 0.5])
     assert step.match is not None
     assert step.match.reason == "too few points on the map"
 
@@ -188,6 +189,22 @@ def test_the_first_increment_is_none(hall: HallRun) -> None:
     assert scan_of(hall.recording, 3).time == pytest.approx(0.6)
 
 
+def test_following_a_recording_is_step_after_step(hall: HallRun) -> None:
+    """The same increments and scans, put together from the recording's arrays by hand."""
+    first = 15
+    slam = GridSlam(hall.recording.T_world_robot[0], hall.slam.config)
+    poses = slam.follow(itertools.islice(hall.recording.way(), first))
+    np.testing.assert_array_equal(poses, hall.poses[:first])
+    for k, (increment, scan) in enumerate(itertools.islice(hall.recording.way(), first)):
+        assert scan.time == hall.recording.times[k]
+        np.testing.assert_array_equal(scan.ranges, hall.recording.ranges[k])
+        assert (increment is None) == (k == 0)
+        if increment is not None:
+            moved = [float(increment.ds[0]), float(increment.dalpha[0])]
+            assert moved == hall.recording.odometry.increment[k - 1].tolist()
+            np.testing.assert_array_equal(increment.cov[0], hall.recording.odometry.cov[k - 1])
+
+
 def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:
     """Robot and landmark lost together by a metre: a corner 0.3 m beside the landmark is not this landmark.
 
@@ -202,7 +219,7 @@ def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:
     z, cov_z = np.array([2.0, 0.5]), 1e-4 * np.eye(2)
     slam.filter.update(np.array([0]), z[None, None], cov_z)
     slam.landmarks.landmarks.append(Landmark(0, 0.3, np.pi / 2, True, np.array([1.1, -0.5]), born=0))
-    J = observation.vehicle_from_world_with_jacobians(slam.pose, slam.places()[0])
+    J = observation.vehicle_from_world_with_jacobians(slam.T_world_robot, slam.places()[0])
     _, P = (a[0] for a in slam.filter.blocks.full())
     H = np.hstack([J.J_pose, J.J_landmark])
     S = H @ P @ H.T + cov_z
@@ -239,10 +256,10 @@ def test_with_landmarks_alone_the_filter_is_honest() -> None:
     for seed in range(16):
         recording = simulate(world, np.random.default_rng(seed))
         config = GridSlamConfig(match=False, map=MapConfig(d_memory="text"))
-        slam = GridSlam(recording.poses[0], config)
+        slam = GridSlam(recording.T_world_robot[0], config)
         for k in range(len(recording)):
             step = slam.step(increment_of(recording, k), scan_of(recording, k))
-        e = step.pose - recording.poses[-1]
+        e = step.T_world_robot - recording.T_world_robot[-1]
         e[2] = so2.wrap(e[2])
         total += float(e @ np.linalg.solve(step.cov, e))
     low, high = chi2.ppf([0.0005, 0.9995], 48)

@@ -84,7 +84,7 @@ def kernel(*arguments, returns=types.void):
 
 
 def unpacks(dispatcher):
-    """Declare a Python function that unpacks NamedTuples for a kernel; both are compiled together."""
+    """Declare a twin in Python that hands the fields of NamedTuples to a kernel."""
 
     def declare(function):
         function.kernel = dispatcher
@@ -93,10 +93,10 @@ def unpacks(dispatcher):
     return declare
 
 
-def compiled(function):
-    """Compile a kernel, or the one behind :func:`unpacks`, for its signature, and for no other."""
-    dispatcher = getattr(function, "kernel", function)
+def compiled(twin):
+    """Compile a kernel for its signature, or read it from the cache, and for no other; return the twin."""
+    dispatcher = getattr(twin, "kernel", twin)
     if not dispatcher.signatures:
         dispatcher.compile(dispatcher.signature)
         dispatcher.disable_compile()
-    return function
+    return twin

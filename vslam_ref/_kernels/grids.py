@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from vslam_ref._kernels._signature import given, kernel, njit
+from vslam_ref._kernels._signature import given, kernel, njit, unpacks
 
 QUANTA = 4096
 MAX_LENGTH = 16384
@@ -105,8 +105,7 @@ def _look(rows, columns, start, ends, hit, graze):
 
 
 @kernel(LAYER, types.int64, given(1), given(2), given(1, types.boolean), given(1), types.float64)
-def apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
-    """Twin of :func:`vslam_ref.grids.plain.apply_plain`."""
+def _apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
     window, low = _look(log_odds.shape[0] // columns, columns, start, ends, hit, 0)
     miss_adds, hit_adds = evidence[0], evidence[1]
     for r in range(window.shape[0]):
@@ -118,6 +117,12 @@ def apply_plain(log_odds, columns, start, ends, hit, evidence, bound):
             v = part[c] + added
             v = bound if v > bound else v
             part[c] = -bound if v < -bound else v
+
+
+@unpacks(_apply_plain)
+def apply_plain(log_odds, columns, beams, evidence, bound):
+    """Twin of :func:`vslam_ref.grids.plain.apply_plain`."""
+    _apply_plain(log_odds, columns, *beams, evidence, bound)
 
 
 @njit(cache=True)
@@ -153,24 +158,29 @@ def _clipped(v, bound):
     return min(max(v, -bound), bound)
 
 
+@njit(cache=True)
+def _explain(window, low, s, columns, reach, lines):
+    """Flag hits that a static cell explains, and those that continue a line: before S changes."""
+    for r in range(window.shape[0]):
+        for c in range(window.shape[1]):
+            if window[r, c] == HIT:
+                row, column = r + low[1], c + low[0]
+                explained = reach > 0 and _near_static(s, columns, row, column, reach)
+                in_line = lines and _continues_line(s, columns, row, column)
+                window[r, c] |= (EXPLAINED if explained else 0) | (IN_LINE if in_line else 0)
+
+
 @kernel(
     LAYER, LAYER, LAYER, LAYER, LAYER, types.int64, given(1), given(2), given(1, types.boolean),
-    given(2), given(2), given(1), types.float64,
+    given(2), given(2), *(types.float64,) * 6, types.int64, types.int64, types.float64,
 )  # fmt: skip
-def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, steps_d, limits, now):
-    """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
-    s_bound, d_bound, lifetime, settle = limits[0], limits[1], limits[2], limits[3]
-    gap, reach, in_line, graze = limits[4], int(limits[5]), limits[6], int(limits[7])
+def _apply_scan(
+    s, d, seen, last_hit, since, columns, start, ends, hit,
+    steps_s, steps_d, s_bound, d_bound, lifetime, settle, in_line, gap, reach, graze, now,
+):  # fmt: skip
     window, low = _look(s.shape[0] // columns, columns, start, ends, hit, graze)
-    if reach > 0 or in_line < settle:  # before S changes
-        for r in range(window.shape[0]):
-            for c in range(window.shape[1]):
-                if window[r, c] == HIT:
-                    row, column = r + low[1], c + low[0]
-                    if reach > 0 and _near_static(s, columns, row, column, reach):
-                        window[r, c] |= EXPLAINED
-                    if in_line < settle and _continues_line(s, columns, row, column):
-                        window[r, c] |= IN_LINE
+    if reach > 0 or in_line < settle:
+        _explain(window, low, s, columns, reach, in_line < settle)
     for r in range(window.shape[0]):
         first = (r + low[1]) * columns + low[0]
         for c in range(window.shape[1]):
@@ -196,3 +206,9 @@ def apply_scan(s, d, seen, last_hit, since, columns, start, ends, hit, steps_s, 
             s[at] = _clipped(old + steps_s[state, kind], s_bound)
             d[at] = _clipped(prior + steps_d[state, kind], d_bound)
             seen[at] = now
+
+
+@unpacks(_apply_scan)
+def apply_scan(layers, columns, beams, rules, now):
+    """Twin of :func:`vslam_ref.grids.static_dynamic.apply_scan`."""
+    _apply_scan(*layers, columns, *beams, *rules, now)

@@ -22,14 +22,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.bench.rows import Row, each_backend, row
 from vslam_ref.datasets import carmen, catalogue
-from vslam_ref.grids import MapConfig, StaticDynamicMap, inverse_sensor, static_dynamic
+from vslam_ref.grids import MapConfig, StaticDynamicMap, static_dynamic
 from vslam_ref.grids.log_odds import log_odds
 from vslam_ref.grids.plain import apply_plain
+from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.support.timing import paired
 
 BEAMS, CELLS, RESOLUTION, HALF = 360, 400, 0.1, 19.5
@@ -86,34 +86,30 @@ def peer(ox: list[float], oy: list[float]) -> Array:
     return grid
 
 
-def scan_in_cells() -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Start (2,), ends (360, 2) in cells, all hits, of :func:`room`."""
+def scan_in_cells() -> BeamsInCells:
+    """All hits, of :func:`room`."""
     angles, ranges = room()
     start = np.full(2, CELLS / 2 + 0.5)
     ends = start + ranges[:, None] / RESOLUTION * np.stack([np.cos(angles), np.sin(angles)], 1)
-    return start, ends, np.ones(BEAMS, dtype=np.bool_)
+    return BeamsInCells(start, ends, np.ones(BEAMS, dtype=np.bool_))
 
 
 def one_scan(backend: str, quick: bool) -> list[Row]:
     """OG-1."""
     angles, ranges = room()
     ox, oy = (ranges * np.cos(angles)).tolist(), (ranges * np.sin(angles)).tolist()
-    start, ends, hit = scan_in_cells()
+    beams = scan_in_cells()
     plain, evidence = np.zeros(CELLS * CELLS), log_odds([0.3, 0.8])
-    s, d, seen, last_hit, since = (np.full(CELLS * CELLS, v) for v in (0.0, 0.0, -np.inf, -np.inf, 0.0))
-    config = MapConfig()
-    steps, limits = inverse_sensor.InverseSensor().steps(), static_dynamic.limits(config)
-    clock = [0.0]
+    fills = (0.0, 0.0, -np.inf, -np.inf, 0.0)
+    layers = static_dynamic.Layers(*(np.full(CELLS * CELLS, fill) for fill in fills))
+    rules, clock = static_dynamic.rules_of(MapConfig()), [0.0]
 
     def s_and_d() -> None:
         clock[0] += 0.1
-        static_dynamic.apply_scan(
-            s, d, seen, last_hit, since, CELLS, start, ends, hit,
-            steps.static, steps.dynamic, limits, clock[0],
-        )  # fmt: skip
+        static_dynamic.apply_scan(layers, CELLS, beams, rules, clock[0])
 
     things: dict[str, Callable[[], object]] = {
-        "plain grid": lambda: apply_plain(plain, CELLS, start, ends, hit, evidence, 6.9),
+        "plain grid": lambda: apply_plain(plain, CELLS, beams, evidence, 6.9),
         "S and D": s_and_d,
         "Bresenham loops": lambda: peer(ox, oy),
     }

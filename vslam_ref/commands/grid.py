@@ -46,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting; may be repeated"
     )
+    parser.add_argument(
+        "--video",
+        choices=("small", "half", "full", "none"),
+        default="small",
+        help="film: 320 pixels wide (small, the default), half or full size of the pictures, or none",
+    )
     add_json(parser)
 
 
@@ -53,6 +59,7 @@ def run(options: argparse.Namespace) -> int:
     """Read the log, draw the maps, print and write the numbers."""
     target = json_target(options)
 
+    from vslam_ref import _kernels
     from vslam_ref.commands.tables import table
     from vslam_ref.datasets import carmen
     from vslam_ref.experiments.grid_log import report
@@ -67,8 +74,8 @@ def run(options: argparse.Namespace) -> int:
     log = carmen.read(find_log(options.log))
     warm("grids")
     with files.new_folder(out) as folder:
-        mapped = draw(log, config, folder)
-        content: dict[str, Any] = mapped.numbers()
+        mapped = draw(log, config, folder, options.video)
+        content: dict[str, Any] = mapped.numbers() | {"backend": _kernels.backend()}
         content |= {"config": config_to_dict(config), "versions": versions()}
         report.write_report(folder, mapped, content)
     print(table(["what", "value", "unit"], report.number_rows(content)))
@@ -94,16 +101,17 @@ def find_log(name: str) -> Path:
     raise FormatError(path, None, f"no such file; expected a CARMEN log{others}")
 
 
-def draw(log: CarmenLog, config: GridConfig, folder: Path) -> Mapped:
+def draw(log: CarmenLog, config: GridConfig, folder: Path, video_size: str) -> Mapped:
     """Run over the log with a film and a progress bar."""
     from vslam_ref.datasets import video
     from vslam_ref.experiments.grid_log.frames import Director
     from vslam_ref.experiments.grid_log.mapping import map_log
+    from vslam_ref.experiments.grid_log.report import FILM
 
     with progress_bar(len(log.times)) as progress:
-        if not config.video_frames:
+        if not config.video_frames or video_size == "none":
             return map_log(log, config, None, progress)
-        with video.mp4(folder / "animation.mp4") as film:
+        with video.webm(folder / FILM, video_size) as film:
             return map_log(log, config, Director(film, len(log.times), config.video_frames), progress)
 
 

@@ -1,7 +1,9 @@
-"""Pictures as a video file."""
+"""Pictures as a video file that a browser plays: WebM with VP8."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
+SIZES = ("small", "half", "full", "none")
+"""Of a film: 320 pixels wide, half of the pictures' width, all of it, or no film."""
+SMALL = 320
 
 
 class Film(Protocol):
@@ -21,35 +26,68 @@ class Film(Protocol):
 
 
 @contextmanager
-def mp4(path: Path, fps: float = 10.0) -> Iterator[Film]:
-    """Write pictures of one size to an MP4 file (MPEG-4 part 2, as every player knows it).
+def webm(path: Path, size: str = "small", fps: float = 10.0) -> Iterator[Film]:
+    """Write pictures of one size to a WebM file.
 
-    Sizes are made even, as the format wants it, by repeating the last row or column.
+    Parameters
+    ----------
+    path : Path
+        Not written if no picture comes.
+    size : {"small", "half", "full"}
+        320 pixels wide, or half of the pictures' width, or all of it; both sides are made even, as VP8 wants
+        it, and at least 16 pixels.
+    fps : float
+        Pictures a second.
 
     Raises
     ------
     ValueError
-        If a picture has another size than the first, or this OpenCV writes no MP4.
+        If a picture has another size than the first, the size is unknown, or this OpenCV writes no WebM.
     """
     import cv2
 
-    writer, size = None, None
+    if size not in SIZES[:-1]:
+        raise ValueError(f"size {size!r} of a film: must be one of {', '.join(SIZES[:-1])}")
+    writer, given, shape = None, None, (0, 0)
 
     def add(picture: Bytes) -> None:
-        nonlocal writer, size
-        rows, columns = picture.shape[:2]
-        even = np.pad(picture, ((0, rows % 2), (0, columns % 2), (0, 0)), mode="edge")
-        shape = (even.shape[1], even.shape[0])
+        nonlocal writer, given, shape
         if writer is None:
-            writer, size = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), fps, shape), shape
+            given, shape = picture.shape, _even(picture.shape, size)
+            with _quiet():  # it says that it knows no such tag in such a file, and writes it
+                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), fps, shape)
             if not writer.isOpened():
-                raise ValueError(f"{path}: this OpenCV writes no MP4 video")
-        if shape != size:
-            raise ValueError(f"a picture of {shape} in a video of {size}: all must have one size")
-        writer.write(np.ascontiguousarray(even[..., ::-1]))
+                raise ValueError(f"{path}: this OpenCV writes no WebM video")
+        if picture.shape != given:
+            raise ValueError(f"a picture of {picture.shape} in a film of {given}: all must have one size")
+        shrink = shape[0] < picture.shape[1]
+        way = cv2.INTER_AREA if shrink else cv2.INTER_NEAREST
+        writer.write(cv2.resize(np.ascontiguousarray(picture[..., ::-1]), shape, interpolation=way))
 
     try:
         yield add
     finally:
         if writer is not None:
             writer.release()
+
+
+def _even(shape: tuple[int, ...], size: str) -> tuple[int, int]:
+    """Width and height of the film of pictures (rows, columns, 3), both even."""
+    rows, columns = shape[:2]
+    share = {"small": SMALL / columns, "half": 0.5, "full": 1.0}[size]
+    width, height = (max(2 * round(share * n / 2 + 1e-9), 16) for n in (columns, rows))
+    return width, height
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Nothing reaches the standard error stream, not from C code either."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.grids.lattice import Lattice
-from vslam_ref.grids.scan import BeamCounts, ScanLike, ScanReport, sort_beams
+from vslam_ref.grids.rays import BeamsInCells
+from vslam_ref.grids.scan import BeamCounts, ScanLike, ScanReport, sort_beams, unit_vectors
 
 
 class Canvas:
@@ -42,8 +43,14 @@ class Canvas:
         self.beams = BeamCounts()
         self.time = -math.inf
 
-    def update(self, pose: ArrayLike, scan: ScanLike) -> ScanReport:
-        """Take in one scan, seen from ``pose`` = (x, y, theta) of the laser in the world.
+    def update(self, T_world_laser: ArrayLike, scan: ScanLike) -> ScanReport:
+        """Take in one scan.
+
+        Parameters
+        ----------
+        T_world_laser : array_like, shape (3,)
+            Pose (x, y, theta) of the laser in the world, metres and radians.
+        scan : ScanLike
 
         Returns
         -------
@@ -56,27 +63,24 @@ class Canvas:
             If the pose is not three finite numbers, angles and ranges do not fit together, the time is not
             finite, or the map would exceed its limit of cells.  The map is then as it was.
         """
-        at = np.asarray(pose, dtype=np.float64)
-        if at.shape != (3,) or not np.isfinite(at).all():
-            raise ValueError(f"pose {pose!r}: need three finite numbers x, y, theta")
+        pose = np.asarray(T_world_laser, dtype=np.float64)
+        if pose.shape != (3,) or not np.isfinite(pose).all():
+            raise ValueError(f"pose {T_world_laser!r}: need three finite numbers x, y, theta")
         beams = sort_beams(scan, self._usable_range, self._no_return_is_free)
-        directions = at[2] + beams.angles
-        ends_world = at[:2] + beams.lengths[:, None] * np.stack([np.cos(directions), np.sin(directions)], 1)
-        self.reserve(np.vstack([ends_world, at[:2]]))
+        ends_world = pose[:2] + beams.lengths[:, None] * unit_vectors(pose[2] + beams.angles)
+        points = np.vstack([pose[:2], ends_world])
+        self.reserve(points)
         backward = scan.time <= self.time
         self.time = math.nextafter(self.time, math.inf) if backward else float(scan.time)
         self.scans += 1
         self.backward_stamps += backward
         self.beams = self.beams.plus(beams.counts)
         if len(beams.lengths):
-            self._draw(
-                self.lattice.lattice_from_world(at[:2]),
-                self.lattice.lattice_from_world(ends_world),
-                beams.hit,
-            )
+            in_cells = self.lattice.lattice_from_world(points)
+            self._draw(BeamsInCells(in_cells[0], in_cells[1:], beams.hit))
         return ScanReport(beams.counts, backward)
 
-    def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
+    def _draw(self, beams: BeamsInCells) -> None:
         """Change the layers by beams given in cells from the lattice's corner."""
         raise NotImplementedError
 

@@ -21,25 +21,22 @@ import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class TrackConfig:
     """How clusters are made and followed; every field says why it has its value."""
 
-    join: float = field(default=0.3, metadata={"reason": "the legs of a person", "unit": "m"})
-    least_cells: int = field(
-        default=3, metadata={"reason": "one or two cells are mostly noise or a table's leg"}
-    )
-    gate: float = field(default=0.5, metadata={"reason": "2 m/s over a quarter of a second", "unit": "m"})
-    lost_seconds: float = field(default=1.0, metadata={"reason": "a person behind a pillar", "unit": "s"})
-    velocity_seconds: float = field(default=1.0, metadata={"reason": "a step or two", "unit": "s"})
-    confirm: int = field(default=5, metadata={"reason": "scans; fewer give no velocity worth the name"})
-    least_move: float = field(default=1.0, metadata={"reason": "more than the size of a table", "unit": "m"})
-    move_seconds: float = field(
-        default=5.0, metadata={"reason": "what stood before does not count; 0.2 m/s still moves", "unit": "s"}
-    )
-    wander: float = field(default=1.6, metadata={"reason": "noise of a centre lengthens the way of a walker"})
+    join: float = assume(0.3, "m", "the legs of a person")
+    least_cells: int = assume(3, "", "one or two cells are mostly noise or a table's leg")
+    gate: float = assume(0.5, "m", "2 m/s over a quarter of a second")
+    lost_seconds: float = assume(1.0, "s", "a person behind a pillar")
+    velocity_seconds: float = assume(1.0, "s", "a step or two")
+    confirm: int = assume(5, "", "scans; fewer give no velocity worth the name")
+    least_move: float = assume(1.0, "m", "more than the size of a table")
+    move_seconds: float = assume(5.0, "s", "what stood before does not count; 0.2 m/s still moves")
+    wander: float = assume(1.6, "", "noise of a centre lengthens the way of a walker")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -128,7 +125,7 @@ class Track:
     velocity: Array = field(default_factory=lambda: np.zeros(2))
 
     def predicted(self, time: float) -> Array:
-        """Where the thing is at ``time`` if it goes on as it did."""
+        """Where the thing is (2,) at ``time``, s, if it goes on as it did; world, metres."""
         return self.places[-1] + self.velocity * (time - self.times[-1])
 
 

@@ -20,13 +20,14 @@ A beam that meets a wall at a small angle runs through the wall's own cells firs
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.grids.log_odds import FREE, OCCUPIED, UNKNOWN, log_odds
+from vslam_ref.support.config import assume
 
 Where = Literal["free", "unknown"]
 WHERES: tuple[Where, ...] = ("free", "unknown")
@@ -39,10 +40,6 @@ class Steps(NamedTuple):
     dynamic: Array
 
 
-def _value(value: float, reason: str) -> float:
-    return field(default=value, metadata={"reason": reason})
-
-
 @dataclass(frozen=True)
 class InverseSensor:
     """Probabilities of the table; every field says why it has its value.
@@ -53,21 +50,21 @@ class InverseSensor:
         If a high value is not in (0.5, 1) or a low one not in (0, 0.5).
     """
 
-    s_high: float = _value(
-        0.8, "two hits decide a cell of S (0.94 > 0.9), one does not: a single hit may be noise"
+    s_high: float = assume(
+        0.8, "", "two hits decide a cell of S (0.94 > 0.9), one does not: a single hit may be noise"
     )
-    s_low: float = _value(0.3, "a hit on free floor: something moves there, so S stays free")
-    s_miss: float = _value(
-        0.3, "three misses free a cell (0.07 < 0.1); weaker than a hit, as beams graze walls"
+    s_low: float = assume(0.3, "", "a hit on free floor: something moves there, so S stays free")
+    s_miss: float = assume(
+        0.3, "", "three misses free a cell (0.07 < 0.1); weaker than a hit, as beams graze walls"
     )
-    s_graze: float = _value(
-        0.4, "about half of a miss, in log-odds: at unknown cells a beam's last steps are mostly floor"
+    s_graze: float = assume(
+        0.4, "", "about half of a miss, in log-odds: at unknown cells a beam's last steps are mostly floor"
     )
-    d_high: float = _value(
-        0.95, "one hit decides a cell of D (0.95 > 0.9): a thing that moves is there once only"
+    d_high: float = assume(
+        0.95, "", "one hit decides a cell of D (0.95 > 0.9): a thing that moves is there once only"
     )
-    d_low: float = _value(0.05, "a hit that S explains says as much as a miss: nothing moves there")
-    d_miss: float = _value(0.05, "one miss takes a decided cell of D back (0.95 -> 0.5): it has left")
+    d_low: float = assume(0.05, "", "a hit that S explains says as much as a miss: nothing moves there")
+    d_miss: float = assume(0.05, "", "one miss takes a decided cell of D back (0.95 -> 0.5): it has left")
 
     def __post_init__(self) -> None:
         """Check that high is high and low is low."""

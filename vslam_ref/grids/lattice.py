@@ -118,7 +118,7 @@ class Lattice:
         return held[..., 0] & held[..., 1]
 
     def grown(self, lower_xy: ArrayLike, upper_xy: ArrayLike) -> Lattice:
-        """Return the rectangle, grown by whole blocks until it holds two world points and all between.
+        """Return the rectangle, grown by whole blocks to hold two world points (2,), m, and all between.
 
         Returns itself where it holds them already.
 
@@ -143,7 +143,7 @@ class Lattice:
         return Lattice(self.resolution, (low[0], low[1]), shape)
 
     def moved(self, layer: Array, old: Lattice, fill: float) -> Array:
-        """Return ``layer``, given on ``old``, on this larger lattice; new cells hold ``fill``."""
+        """Return ``layer`` (rows, columns) of ``old`` on this larger lattice; new cells hold ``fill``."""
         new = np.full(self.shape, fill)
         row, column = old.corner[1] - self.corner[1], old.corner[0] - self.corner[0]
         new[row : row + old.shape[0], column : column + old.shape[1]] = layer

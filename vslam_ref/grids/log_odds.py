@@ -25,6 +25,8 @@ FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 def log_odds(probability: ArrayLike) -> Array:
     """Return ``ln(p / (1 - p))`` of probabilities strictly between 0 and 1.
 
+    Implements the left side of :eq:`eq-log-odds`.
+
     Raises
     ------
     ValueError
@@ -43,7 +45,9 @@ def log_odds(probability: ArrayLike) -> Array:
 
 
 def probability(log_odds: ArrayLike) -> Array:
-    """Return ``1 / (1 + exp(-L))``, for any L without overflow.
+    """Return ``1 / (1 + exp(-L))`` of log-odds of any shape (...,), without overflow.
+
+    Implements the right side of :eq:`eq-log-odds`.
 
     Examples
     --------
@@ -57,7 +61,7 @@ def probability(log_odds: ArrayLike) -> Array:
 
 
 def states(log_odds: ArrayLike) -> NDArray[np.int8]:
-    """Return FREE (p < 0.1), UNKNOWN or OCCUPIED (p > 0.9) for every cell."""
+    """Return FREE (p < 0.1), UNKNOWN or OCCUPIED (p > 0.9) for log-odds of any shape (...,)."""
     L = np.asarray(log_odds)
     decided: NDArray[np.int8] = (L > DECIDED_LOG_ODDS).astype(np.int8) - (L < -DECIDED_LOG_ODDS) + np.int8(1)
     return decided
@@ -108,12 +112,12 @@ class LogOddsGrid:
 
     @property
     def probability(self) -> Array:
-        """Probability of every cell."""
+        """Probability of every cell (rows, columns)."""
         return probability(self.log_odds)
 
     @property
     def states(self) -> NDArray[np.int8]:
-        """FREE, UNKNOWN or OCCUPIED for every cell."""
+        """FREE, UNKNOWN or OCCUPIED for every cell (rows, columns)."""
         return states(self.log_odds)
 
     def at(self, xy_world: ArrayLike) -> Array:

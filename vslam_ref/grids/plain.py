@@ -9,14 +9,13 @@ two maps differ in one thing only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
 from vslam_ref.grids.map_config import MapConfig
-from vslam_ref.grids.rays import MISS, look
+from vslam_ref.grids.rays import HIT, MISS, BeamsInCells, look
 
 
 class PlainMap(Canvas):
@@ -37,9 +36,9 @@ class PlainMap(Canvas):
         self._evidence = log_odds([c.sensor.s_miss, c.sensor.s_high])
         self._bound = float(log_odds(c.s_most))
 
-    def _draw(self, start: Array, ends: Array, hit: NDArray[np.bool_]) -> None:
+    def _draw(self, beams: BeamsInCells) -> None:
         layer, columns = self.layers["occupied"].reshape(-1), self.lattice.shape[1]
-        apply_plain(layer, columns, start, ends, hit, self._evidence, self._bound)
+        apply_plain(layer, columns, beams, self._evidence, self._bound)
 
     def occupied(self) -> LogOddsGrid:
         """Return the map, a view that later scans change."""
@@ -47,15 +46,7 @@ class PlainMap(Canvas):
 
 
 @accelerated("grids:apply_plain")
-def apply_plain(
-    log_odds: Array,
-    columns: int,
-    start: Array,
-    ends: Array,
-    hit: NDArray[np.bool_],
-    evidence: Array,
-    bound: float,
-) -> None:
+def apply_plain(log_odds: Array, columns: int, beams: BeamsInCells, evidence: Array, bound: float) -> None:
     """Add one scan to a plain grid, in place.
 
     Parameters
@@ -64,18 +55,29 @@ def apply_plain(
         The map, row by row.
     columns : int
         Cells in a row.
-    start, ends, hit
-        As for :func:`vslam_ref.grids.static_dynamic.apply_scan`.
+    beams : BeamsInCells
+        All inside the map.
     evidence : ndarray, shape (2,)
         Log-odds that a miss and a hit add.
     bound : float
         Largest log-odds.
+
+    Raises
+    ------
+    ValueError
+        As :func:`vslam_ref.grids.rays.look`; nothing is changed then.
+
+    Notes
+    -----
+    The plain form is ``np.clip(part + table[window], -bound, bound)``.  It takes twice as long, and OG-1
+    would be missed (17 times as fast as loops, where 30 are asked).  So the sum is built in an array of
+    its own, as work within the map's rows is slower, and by a product instead of a look-up.
     """
     whole = log_odds.reshape(-1, columns)
-    seen = look(whole.shape, start, ends, hit)
-    part = whole[seen.rows, seen.columns]
-    new = (seen.window == MISS).astype(np.float64)  # of its own: work within the map's rows is slower
+    rows, columns_seen, window = look(whole.shape, beams)
+    part = whole[rows, columns_seen]
+    new = (window == MISS).astype(np.float64)
     new *= evidence[0]
-    new.reshape(-1)[seen.flat_hits] = evidence[1]
+    new.reshape(-1)[np.flatnonzero(window == HIT)] = evidence[1]
     new += part
     np.clip(new, -bound, bound, out=part)

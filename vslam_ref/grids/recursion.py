@@ -48,12 +48,13 @@ def recursion(table: ArrayLike, transition: ArrayLike, prediction: ArrayLike) ->
 
     Parameters
     ----------
-    table : array_like
-        L(S_t | o_t, S_{t-1}).
-    transition : array_like
-        L(S_t | S_{t-1}).
-    prediction : array_like
-        L(S_t | o_1..t-1, S_{t-1}).
+    table, transition, prediction : array_like, shape (...,)
+        L(S_t | o_t, S_{t-1}), L(S_t | S_{t-1}) and L(S_t | o_1..t-1, S_{t-1}).
+
+    Returns
+    -------
+    ndarray, shape (...,)
+        Log-odds.
     """
     after: Array = np.asarray(table, np.float64) - np.asarray(transition) + np.asarray(prediction)
     return after
@@ -93,6 +94,6 @@ def follow(evidence: ArrayLike, reading: Reading, table: Table, start: float = 0
         first = seen + (now if table == "conditioned" else 0.0)
         transition = now if reading == "unchanged" else 0.0
         prediction = 0.0 if reading == "forgetful" else now
-        now = float(recursion(first, transition, prediction))
+        now = float(recursion(first, transition, prediction))  # eq-twice for "printed", "conditioned"
         path[k] = now
     return path

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.arrays import Array
 
@@ -166,6 +166,19 @@ def sort_beams(scan: ScanLike, usable_range: float, no_return_is_free: bool) -> 
     ranges = ranges[used]
     hit = good[used] & (ranges <= usable_range)
     return Beams(angles[used], np.minimum(ranges, reach), hit, counts)
+
+
+def unit_vectors(angles: ArrayLike) -> Array:
+    """Directions (..., 2) of angles (...,), radians.
+
+    Examples
+    --------
+    >>> unit_vectors([0.0, np.pi / 2]).round(12)
+    array([[1., 0.],
+           [0., 1.]])
+    """
+    a = np.asarray(angles, dtype=np.float64)
+    return np.stack([np.cos(a), np.sin(a)], -1)
 
 
 class ScanReport(NamedTuple):

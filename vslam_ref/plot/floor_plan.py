@@ -59,12 +59,12 @@ def draw_floor(axes: Axes, recording: Recording, k: int, *, beams: bool = True, 
             0.15,
         )
         _discs(axes, s.discs, MOVING, 0.9)
-    draw_robot(axes, recording.poses[k])
+    draw_robot(axes, recording.T_world_robot[k])
     _square(axes)
 
 
 def _draw_beams(axes: Axes, recording: Recording, k: int) -> None:
-    r, pose = recording.ranges[k], recording.poses[k]
+    r, pose = recording.ranges[k], recording.T_world_robot[k]
     hit = np.isfinite(r) & (recording.owner[k] >= 0)
     angles = recording.angles[hit]
     ends = se2.act(pose, r[hit, None] * np.stack([np.cos(angles), np.sin(angles)], 1))
@@ -143,7 +143,7 @@ def maps_figure(
         ends = recording.segments[0].reshape(-1, 2)
         for axes, (title, grid) in zip(panels, grids.items(), strict=True):
             draw_map(axes, grid, title)
-            draw_robot(axes, recording.poses[k])
+            draw_robot(axes, recording.T_world_robot[k])
             axes.set(xlim=(ends[:, 0].min() - 0.3, ends[:, 0].max() + 0.3))
             axes.set_ylim(ends[:, 1].min() - 0.3, ends[:, 1].max() + 0.3)
         people = recording.people[k]

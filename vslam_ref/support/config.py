@@ -40,6 +40,11 @@ class Setting(NamedTuple):
     unit: str
 
 
+def assume(default: Any, unit: str, reason: str) -> Any:
+    """Declare a field of a config: its default, its unit ("" for none), and why it has this value."""
+    return dataclasses.field(default=default, metadata={"reason": reason, "unit": unit})
+
+
 def settings(config: Any, prefix: str = "") -> Iterator[Setting]:
     """Yield the settings of a config in order, those of configs inside it with dotted keys."""
     hints = typing.get_type_hints(type(config))

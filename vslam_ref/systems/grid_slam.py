@@ -13,6 +13,7 @@ chapter 20.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -34,31 +35,27 @@ from vslam_ref.grids.landmarks.pose_update import pose_measurement, pose_update
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
 from vslam_ref.grids.map_config import MapConfig
 from vslam_ref.grids.plain import PlainMap
-from vslam_ref.grids.scan import ScanLike, sort_beams
+from vslam_ref.grids.scan import ScanLike, sort_beams, unit_vectors
 from vslam_ref.grids.static_dynamic import StaticDynamicMap
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class GridSlamConfig:
     """The loop's parts; every field says why it has its value."""
 
-    separate: bool = field(default=True, metadata={"reason": "S and D; False: one plain occupancy grid"})
-    match: bool = field(
-        default=True, metadata={"reason": "scan against map, the second way of A4.4's localisation"}
+    separate: bool = assume(True, "", "S and D; False: one plain occupancy grid")
+    match: bool = assume(True, "", "scan against map, the second way of A4.4's localisation")
+    leave_out_moving: bool = assume(
+        False, "", "a matcher with a cut ignores them anyway; True: beams that D takes for moving"
     )
-    leave_out_moving: bool = field(
-        default=False,
-        metadata={"reason": "a matcher with a cut ignores them anyway; True: beams that D takes for moving"},
-    )
-    landmarks: bool = field(default=True, metadata={"reason": "A4.4's landmarks"})
-    map: MapConfig = field(default_factory=MapConfig, metadata={"reason": "see there"})
-    matching: MatchConfig = field(default_factory=MatchConfig, metadata={"reason": "see there"})
-    corners: CornerConfig = field(default_factory=CornerConfig, metadata={"reason": "see there"})
-    corners_of_s: MapCornerConfig = field(default_factory=MapCornerConfig, metadata={"reason": "see there"})
-    choice: LandmarkConfig = field(default_factory=LandmarkConfig, metadata={"reason": "see there"})
-    field_reach: float = field(
-        default=0.5, metadata={"reason": "more than where the search's loss ends", "unit": "m"}
-    )
+    landmarks: bool = assume(True, "", "A4.4's landmarks")
+    map: MapConfig = field(default_factory=MapConfig)
+    matching: MatchConfig = field(default_factory=MatchConfig)
+    corners: CornerConfig = field(default_factory=CornerConfig)
+    corners_of_s: MapCornerConfig = field(default_factory=MapCornerConfig)
+    choice: LandmarkConfig = field(default_factory=LandmarkConfig)
+    field_reach: float = assume(0.5, "m", "more than where the search's loss ends")
 
 
 class Step(NamedTuple):
@@ -66,7 +63,7 @@ class Step(NamedTuple):
 
     Attributes
     ----------
-    pose, cov : ndarray, shapes (3,), (3, 3)
+    T_world_robot, cov : ndarray, shapes (3,), (3, 3)
         Estimate after the scan.
     match : Match or None
         None without matching, and for the first scan.
@@ -79,13 +76,18 @@ class Step(NamedTuple):
     withdrawn : list of Landmark
     """
 
-    pose: Array
+    T_world_robot: Array
     cov: Array
     match: Match | None
     corners: Corners
     landmark: IntArray
     chosen: IntArray
     withdrawn: list[Landmark]
+
+    @property
+    def pose(self) -> Array:
+        """Short for ``T_world_robot``."""
+        return self.T_world_robot
 
 
 class GridSlam:
@@ -134,7 +136,7 @@ class GridSlam:
         self.scans = 0
 
     @property
-    def pose(self) -> Array:
+    def T_world_robot(self) -> Array:
         """Estimated pose (3,)."""
         return np.array(self.filter.blocks.x_p[0])
 
@@ -173,17 +175,28 @@ class GridSlam:
             landmark = self._use(corners)
             chosen = self._choose(corners, landmark)
             withdrawn = self.landmarks.check(
-                self.scans, self.pose, self.places(), angles, ranges, self.static()
+                self.scans, self.T_world_robot, self.places(), scan, self.static()
             )
-        self.maps.update(self.pose, scan)
+        self.maps.update(self.T_world_robot, scan)
         self.scans += 1
-        return Step(self.pose, self.filter.blocks.P_pp[0].copy(), match, corners, landmark, chosen, withdrawn)
+        cov = self.filter.blocks.P_pp[0].copy()
+        return Step(self.T_world_robot, cov, match, corners, landmark, chosen, withdrawn)
+
+    def follow(self, way: Iterable[tuple[Increment | None, ScanLike]]) -> Array:
+        """Go through a whole recording; return the poses ``T_world_robot`` (n, 3) after each scan.
+
+        Parameters
+        ----------
+        way : iterable of (increment, scan)
+            As for :meth:`step`.
+        """
+        return np.array([self.step(increment, scan).T_world_robot for increment, scan in way])
 
     def _match(self, angles: Array, ranges: Array, max_range: float) -> Match:
         """Match the scan with the map, and give its word to the filter."""
         c, b = self.config, self.filter.blocks
         used = np.isfinite(ranges) & (ranges > 0) & (ranges < max_range)
-        ends = ranges[used, None] * np.stack([np.cos(angles[used]), np.sin(angles[used])], 1)
+        ends = ranges[used, None] * unit_vectors(angles[used])
         predicted, cov = b.x_p[0].copy(), b.P_pp[0].copy()
         field = distance_field(self.static(), c.field_reach)
         if c.leave_out_moving and c.separate:
@@ -191,7 +204,7 @@ class GridSlam:
         points = thin(ends, c.map.resolution)
         found = match_scan(field, points, predicted, cov, c.matching)
         if found.reason == "converged":
-            pose_update(b, *pose_measurement(found.pose, found.information, predicted, cov))
+            pose_update(b, *pose_measurement(found.T_world_laser, found.information, predicted, cov))
         return found
 
     def _use(self, corners: Corners) -> IntArray:
@@ -200,18 +213,10 @@ class GridSlam:
         landmark = np.full(len(corners), NONE)
         if not active or len(corners) == 0:
             return landmark
-        columns = self._columns()
-        H = observation.vehicle_from_world_with_jacobians(b.x_p[0], self.places())
-        own = columns[:, None] + np.arange(2)
-        P_pl = b.P_pm[0][:, own].transpose(1, 0, 2)
-        P_ll = b.P_mm[0][own[:, :, None], own[:, None, :]]
-        cross = H.J_pose @ P_pl @ H.J_landmark.swapaxes(1, 2)
-        S = H.J_pose @ b.P_pp[0] @ H.J_pose.swapaxes(1, 2) + cross + cross.swapaxes(1, 2)
-        S = S + H.J_landmark @ P_ll @ H.J_landmark.swapaxes(1, 2)
+        h, S = self._predicted()
         world = Signature(so2.wrap(b.x_p[0, 2] + corners.bisector), corners.opening, corners.convex)
         alike = look_alike(world, self.landmarks.signature())
-        innovation = corners.xy[:, None] - H.value[None]
-        which = associate(innovation, S[None] + corners.cov[:, None], alike).landmark
+        which = associate(corners.xy[:, None] - h, S + corners.cov[:, None], alike).landmark
         rows = np.flatnonzero(which >= 0)
         ids = np.array([active[k].id for k in which[rows]], dtype=np.int64)
         if len(rows):
@@ -222,10 +227,20 @@ class GridSlam:
         landmark[which < NONE] = which[which < NONE]
         return landmark
 
+    def _predicted(self) -> tuple[Array, Array]:
+        """Active landmarks as seen from the pose (n, 2), metres, and H P H^T of each (n, 2, 2)."""
+        b, own = self.filter.blocks, self._columns()[:, None] + np.arange(2)
+        H = observation.vehicle_from_world_with_jacobians(b.x_p[0], self.places())
+        P_pl = b.P_pm[0][:, own].transpose(1, 0, 2)
+        P_ll = b.P_mm[0][own[:, :, None], own[:, None, :]]
+        cross = H.J_pose @ P_pl @ H.J_landmark.swapaxes(1, 2)
+        S = H.J_pose @ b.P_pp[0] @ H.J_pose.swapaxes(1, 2) + cross + cross.swapaxes(1, 2)  # eq-gate-cov
+        return H.value, S + H.J_landmark @ P_ll @ H.J_landmark.swapaxes(1, 2)
+
     def _choose(self, corners: Corners, landmark: IntArray) -> IntArray:
         """Let unclaimed corners become landmarks, and put these into the filter."""
         chosen = self.landmarks.choose(
-            self.scans, self.pose, corners, landmark == NONE, self.places(), self.static()
+            self.scans, self.T_world_robot, corners, landmark == NONE, self.places(), self.static()
         )
         if len(chosen.id):
             self.filter.update(chosen.id, corners.xy[chosen.corner][None], corners.cov[chosen.corner])

@@ -43,7 +43,7 @@ def picture(moment: Moment) -> Bytes:
             paint(with_d, lattice.cells_from_world(np.array(track.places)), SKY)
     plain = canvas(moment.plain)
     for image in (with_d, plain):
-        paint(image, robot(lattice, moment.pose), BLUE)
+        paint(image, robot(lattice, moment.T_world_laser), BLUE)
     parts = [fitted(image[rows, columns], wide) for image in (with_d, plain)]
     axis = 0 if wide else 1
     shape = list(parts[0].shape)
@@ -63,13 +63,13 @@ def paint(image: Bytes, cells: IntArray, colour: tuple[int, int, int]) -> None:
     image[cells[inside, 0], cells[inside, 1]] = colour
 
 
-def robot(lattice: Lattice, pose: NDArray[np.float64]) -> IntArray:
+def robot(lattice: Lattice, T_world_laser: NDArray[np.float64]) -> IntArray:
     """Cells of a disc of 0.3 m with a nose."""
     reach = max(0.3, lattice.resolution)
     x, y = np.meshgrid(*(np.arange(-reach, reach + 1e-9, lattice.resolution / 2),) * 2)
     disc = np.stack([x, y], -1)[x**2 + y**2 <= reach**2]
-    nose = np.linspace(0.0, 2.5 * reach, 12)[:, None] * [np.cos(pose[2]), np.sin(pose[2])]
-    return lattice.cells_from_world(pose[:2] + np.vstack([disc, nose]))
+    nose = np.linspace(0.0, 2.5 * reach, 12)[:, None] * [np.cos(T_world_laser[2]), np.sin(T_world_laser[2])]
+    return lattice.cells_from_world(T_world_laser[:2] + np.vstack([disc, nose]))
 
 
 def fitted(image: Bytes, wide: bool) -> Bytes:

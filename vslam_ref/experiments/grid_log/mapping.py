@@ -16,15 +16,17 @@ from vslam_ref.grids import MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.clusters import Clusters, TrackConfig, Tracker, find_clusters
 from vslam_ref.grids.lattice import Lattice
 from vslam_ref.grids.log_odds import OCCUPIED, LogOddsGrid, entropy_bits
+from vslam_ref.grids.scan import unit_vectors
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class GridConfig:
     """Maps and tracks of a log."""
 
-    map: MapConfig = field(default_factory=MapConfig, metadata={"reason": "see there"})
-    tracks: TrackConfig = field(default_factory=TrackConfig, metadata={"reason": "see there"})
-    video_frames: int = field(default=300, metadata={"reason": "half a minute at ten a second; 0 for none"})
+    map: MapConfig = field(default_factory=MapConfig)
+    tracks: TrackConfig = field(default_factory=TrackConfig)
+    video_frames: int = assume(300, "", "half a minute at ten a second; 0 for none")
 
     def __post_init__(self) -> None:
         """Check the number of frames."""
@@ -40,7 +42,7 @@ class Moment(NamedTuple):
 
     number: int
     window: tuple[slice, slice]
-    pose: Array
+    T_world_laser: Array
     static: LogOddsGrid
     plain: LogOddsGrid
     clusters: Clusters
@@ -103,12 +105,12 @@ def bounds(log: CarmenLog, usable_range: float, resolution: float, no_return: st
         If a map between them would exceed its limit, with the line of the pose that is farthest off.
     """
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for pose, ranges in zip(log.poses, log.ranges, strict=True):
+    for T_world_laser, ranges in zip(log.poses, log.ranges, strict=True):
         used = (ranges > 0) & ((ranges < log.scanner.max_range) | (no_return == "free"))
-        angles = pose[2] + log.scanner.angles[used]
+        angles = T_world_laser[2] + log.scanner.angles[used]
         length = np.minimum(ranges[used], usable_range)[:, None]
-        ends = pose[:2] + length * np.stack([np.cos(angles), np.sin(angles)], 1)
-        points = np.vstack([pose[:2], ends])
+        ends = T_world_laser[:2] + length * unit_vectors(angles)
+        points = np.vstack([T_world_laser[:2], ends])
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     try:
         Lattice(resolution).grown(low, high)
@@ -147,11 +149,11 @@ def map_log(
     dynamic_scans = np.zeros(grid.lattice.shape, dtype=np.int64)
     last_dynamic = np.full(grid.lattice.shape, np.nan)
     seconds = 0.0
-    for number, (pose, scan) in enumerate(log.scans()):
+    for number, (T_world_laser, scan) in enumerate(log.scans()):
         began = time.perf_counter()
-        grid.update(pose, scan)
+        grid.update(T_world_laser, scan)
         seconds += time.perf_counter() - began
-        plain.update(pose, scan)
+        plain.update(T_world_laser, scan)
         clusters = find_clusters(grid.dynamic(), config.tracks.join)
         at = clusters.cells[:, 0], clusters.cells[:, 1]
         dynamic_scans[at] += 1
@@ -159,7 +161,7 @@ def map_log(
         large = keep_large(clusters, config.tracks.least_cells)
         tracker.update(grid.time, large)
         if see is not None:
-            see(Moment(number, window, pose, grid.static(), plain.occupied(), large, tracker))
+            see(Moment(number, window, T_world_laser, grid.static(), plain.occupied(), large, tracker))
         if progress is not None:
             progress(number + 1)
     return Mapped(log, config, grid, plain, tracker, dynamic_scans, last_dynamic, seconds)
@@ -167,8 +169,8 @@ def map_log(
 
 def warm_up(log: CarmenLog, config: GridConfig) -> None:
     """Draw the first scan into a map of its own, so that no compilation is timed."""
-    for pose, scan in log.scans():
-        StaticDynamicMap(config.map).update(pose, scan)
+    for T_world_laser, scan in log.scans():
+        StaticDynamicMap(config.map).update(T_world_laser, scan)
         return
 
 

@@ -10,7 +10,7 @@
                                   resolution, times
     OUT/tracks.csv                what moved: id, time, x, y
     OUT/maps.png, .svg            the maps, and where and when something moved
-    OUT/animation.mp4             S with D, and the plain grid, over time
+    OUT/animation.webm            S with D, and the plain grid, over time
     OUT/report.html               the page: numbers and pictures inside it, the film beside it
 """
 
@@ -31,6 +31,7 @@ from vslam_ref.plot.grids import log_figure
 from vslam_ref.plot.saving import figure_bytes
 from vslam_ref.support.json_text import to_json
 
+FILM = "animation.webm"
 ROWS = (
     ("scans", "scans", ""),
     ("backward_stamps", "stamps that do not move forward", ""),
@@ -136,9 +137,10 @@ def _page(title: str, content: Mapping[str, Any], png: bytes, folder: Path) -> s
         for words, value, unit in number_rows(content)
     )
     film = ""
-    if (folder / "animation.mp4").exists():
+    if (folder / FILM).exists():
         film = (
-            '<p><a href="animation.mp4">animation.mp4</a>: S with D in red-orange and the ways of what '
+            f'<p><video src="{FILM}" controls muted loop playsinline></video><br>\n'
+            f'<a href="{FILM}">{FILM}</a>: S with D in red-orange and the ways of what '
             "moved in light blue, the plain grid beside it, the robot in blue.</p>\n"
         )
     data = base64.b64encode(png).decode("ascii")

@@ -101,7 +101,7 @@ def associate(innovation: ArrayLike, S: ArrayLike, alike: ArrayLike, gate2: floa
     array([-2])
     """
     distance2 = np.where(np.asarray(alike, dtype=bool), gate(innovation, S), np.inf)
-    inside = distance2 <= gate2
+    inside = distance2 <= gate2  # eq-gate
     landmark = np.full(len(distance2), NONE)
     if distance2.size == 0:
         return Association(landmark, distance2)

@@ -112,29 +112,38 @@ def sampled(points: ArrayLike, field: DistanceField) -> Sampled:
     return Sampled(np.where(inside, value, field.most), slope)
 
 
-def scan_residuals(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Array:
+def scan_residuals(T_world_laser: ArrayLike, points: ArrayLike, field: DistanceField) -> Array:
     """Distances (..., 1) of scan points from what is static.
 
     Implements :eq:`eq-field-residual`.
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
+    T_world_laser : array_like, shape (..., 3)
         ``T_world_laser`` as (x, y, theta).
     points : array_like, shape (..., 2)
         In the laser's frame, metres.
     field : DistanceField
     """
-    return scan_residuals_with_jacobians(pose, points, field).value
+    return scan_residuals_with_jacobians(T_world_laser, points, field).value
 
 
-def scan_residuals_with_jacobians(pose: ArrayLike, points: ArrayLike, field: DistanceField) -> Residuals:
+def scan_residuals_with_jacobians(
+    T_world_laser: ArrayLike, points: ArrayLike, field: DistanceField
+) -> Residuals:
     """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters."""
-    pose, points = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
-    world = se2.act(pose, points)
+    T_world_laser, points = np.asarray(T_world_laser, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    world = se2.act(T_world_laser, points)
     at = sampled(world, field)
-    lever = world - pose[..., :2]
+    lever = world - T_world_laser[..., :2]
     turn = at.slope[..., 1] * lever[..., 0] - at.slope[..., 0] * lever[..., 1]
     J_pose = np.concatenate([at.slope, turn[..., None]], -1)
-    J_point = at.slope[..., None, :] @ so2.exp(pose[..., 2])
+    J_point = at.slope[..., None, :] @ so2.exp(T_world_laser[..., 2])
     return Residuals(at.value[..., None], J_pose[..., None, :], J_point)
+
+
+def pose_difference(a: ArrayLike, b: ArrayLike) -> Array:
+    """Difference a - b (..., 3) of poses (x, y, theta), metres and radians, the angle in (-pi, pi]."""
+    off = np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64)
+    off[..., 2] = so2.wrap(off[..., 2])
+    return off

@@ -12,7 +12,7 @@ that looks the same no second one is set: the two would be mistaken for each oth
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,6 +24,8 @@ from vslam_ref.grids.landmarks.association import TURN, Signature, look_alike
 from vslam_ref.grids.landmarks.lines import Corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, map_corners, static_along_arms
 from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.grids.scan import ScanLike, unit_vectors
+from vslam_ref.support.config import assume
 
 Why = Literal["", "seen through", "no longer static in S"]
 
@@ -32,33 +34,17 @@ Why = Literal["", "seen through", "no longer static in S"]
 class LandmarkConfig:
     """How landmarks are chosen and withdrawn; every field says why it has its value."""
 
-    static_only: bool = field(default=True, metadata={"reason": "A4.4: landmarks must be taken from S"})
-    withdraw: bool = field(
-        default=True, metadata={"reason": "what was static when chosen may be moved later"}
-    )
-    confirm: int = field(
-        default=5, metadata={"reason": "a second of scans; noise makes no corner five times"}
-    )
-    same: float = field(
-        default=0.12, metadata={"reason": "a candidate seen again; four sigma of a corner", "unit": "m"}
-    )
-    forget: int = field(
-        default=10, metadata={"reason": "two seconds unseen: the candidate was none", "unit": "scans"}
-    )
-    apart: float = field(
-        default=0.6, metadata={"reason": "look-alikes nearer than a gate's width", "unit": "m"}
-    )
-    corner_of_s: float = field(
-        default=0.3, metadata={"reason": "three cells from a corner of S", "unit": "m"}
-    )
-    arms: float = field(default=0.8, metadata={"reason": "share of both arms decided static by S"})
-    arms_left: float = field(default=0.3, metadata={"reason": "below it S has taken the walls away"})
-    beyond: float = field(
-        default=0.25, metadata={"reason": "a beam that ends this far behind went through", "unit": "m"}
-    )
-    through: int = field(
-        default=3, metadata={"reason": "three scans running: noise does not", "unit": "scans"}
-    )
+    static_only: bool = assume(True, "", "A4.4: landmarks must be taken from S")
+    withdraw: bool = assume(True, "", "what was static when chosen may be moved later")
+    confirm: int = assume(5, "", "a second of scans; noise makes no corner five times")
+    same: float = assume(0.12, "m", "a candidate seen again; four sigma of a corner")
+    forget: int = assume(10, "scans", "two seconds unseen: the candidate was none")
+    apart: float = assume(0.6, "m", "look-alikes nearer than a gate's width")
+    corner_of_s: float = assume(0.3, "m", "three cells from a corner of S")
+    arms: float = assume(0.8, "", "share of both arms decided static by S")
+    arms_left: float = assume(0.3, "", "below it S has taken the walls away")
+    beyond: float = assume(0.25, "m", "a beam that ends this far behind went through")
+    through: int = assume(3, "scans", "three scans running: noise does not")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -108,10 +94,10 @@ class Landmark:
 
 @dataclass(eq=False)
 class _Candidate:
+    """A corner that may become a landmark: how it looked first, where it was last, and how often."""
+
+    first: Landmark
     xy: Array
-    bisector: float
-    opening: float
-    convex: bool
     count: int
     last: int
 
@@ -147,7 +133,7 @@ class LandmarkMap:
     def choose(
         self,
         scan: int,
-        pose: ArrayLike,
+        T_world_laser: ArrayLike,
         corners: Corners,
         unclaimed: BoolArray,
         places: Array,
@@ -159,7 +145,7 @@ class LandmarkMap:
         ----------
         scan : int
             Number of this scan.
-        pose : array_like, shape (3,)
+        T_world_laser : array_like, shape (3,)
             ``T_world_laser``.
         corners : Corners
             Of this scan, in the laser's frame.
@@ -170,50 +156,46 @@ class LandmarkMap:
         static : LogOddsGrid
             S (or whatever map stands in for it).
         """
-        c, pose = self.config, np.asarray(pose, dtype=np.float64)
+        c, pose = self.config, np.asarray(T_world_laser, dtype=np.float64)
         self._candidates = [k for k in self._candidates if scan - k.last <= c.forget]
-        ripe = []
+        bisector, arms = so2.wrap(pose[2] + corners.bisector), so2.wrap(pose[2] + corners.arms)
+        xy_world = se2.act(pose, corners.xy)
+        ripe: list[tuple[int, _Candidate]] = []
         for i in np.flatnonzero(unclaimed).tolist():
-            xy = se2.act(pose, corners.xy[i])
-            bisector = float(so2.wrap(pose[2] + corners.bisector[i]))
-            candidate = self._seen_again(
-                xy, bisector, float(corners.opening[i]), bool(corners.convex[i]), scan
-            )
+            opening, convex = float(corners.opening[i]), bool(corners.convex[i])
+            look = Landmark(-1, float(bisector[i]), opening, convex, arms[i], scan)
+            candidate = self._seen_again(xy_world[i], look, scan)
             if candidate.count >= c.confirm:
                 ripe.append((i, candidate))
-        if not ripe:
-            return Chosen(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-        rows = np.array([i for i, _ in ripe])
-        arms = so2.wrap(pose[2] + corners.arms[rows])
-        good = self._static(static, np.stack([k.xy for _, k in ripe]), arms)
+        rows = np.array([i for i, _ in ripe], dtype=np.int64)
+        good = self._static(static, xy_world[rows], arms[rows])
         new: list[tuple[int, int]] = []
-        known = [(p, m) for p, m in zip(places, self.active, strict=True)]
-        for (i, candidate), direction, is_static in zip(ripe, arms, good, strict=True):
-            if not bool(is_static) or self._too_near(candidate, known):
+        known = list(zip(places, self.active, strict=True))
+        for (i, candidate), is_static in zip(ripe, good.tolist(), strict=True):
+            if not is_static or self._too_near(candidate, known):
                 continue
-            mark = Landmark(
-                len(self.landmarks), candidate.bisector, candidate.opening, candidate.convex, direction, scan
-            )
+            mark = replace(candidate.first, id=len(self.landmarks), arms=arms[i], born=scan)
             self.landmarks.append(mark)
             known.append((candidate.xy, mark))
-            self._candidates = [k for k in self._candidates if k is not candidate]
+            self._candidates.remove(candidate)
             new.append((i, mark.id))
         pairs = np.array(new, dtype=np.int64).reshape(-1, 2)
         return Chosen(pairs[:, 0], pairs[:, 1])
 
-    def _seen_again(self, xy: Array, bisector: float, opening: float, convex: bool, scan: int) -> _Candidate:
+    def _seen_again(self, xy: Array, look: Landmark, scan: int) -> _Candidate:
+        """Return the candidate that this corner is, or a new one."""
         for k in self._candidates:
-            near = np.hypot(*(k.xy - xy)) <= self.config.same and abs(so2.wrap(k.bisector - bisector)) < TURN
-            if near and k.convex == convex and k.last < scan:
-                k.xy = xy
-                k.count, k.last = k.count + 1, scan
+            near = np.hypot(*(k.xy - xy)) <= self.config.same
+            alike = abs(so2.wrap(k.first.bisector - look.bisector)) < TURN and k.first.convex == look.convex
+            if near and alike and k.last < scan:
+                k.xy, k.count, k.last = xy, k.count + 1, scan
                 return k
-        self._candidates.append(_Candidate(xy, bisector, opening, convex, 1, scan))
+        self._candidates.append(_Candidate(look, xy, 1, scan))
         return self._candidates[-1]
 
     def _static(self, static: LogOddsGrid, xy: Array, arms: Array) -> BoolArray:
         """Whether S holds these corners: static along both arms, and a corner of S near."""
-        if not self.config.static_only:
+        if not self.config.static_only or len(xy) == 0:
             return np.ones(len(xy), dtype=bool)
         along = static_along_arms(static, xy, arms) >= self.config.arms
         if not along.any():
@@ -228,13 +210,10 @@ class LandmarkMap:
     def _too_near(self, candidate: _Candidate, known: list[tuple[Array, Landmark]]) -> bool:
         """Whether a landmark that looks alike lies nearer than ``apart``."""
         near = [m for p, m in known if np.hypot(*(p - candidate.xy)) < self.config.apart]
-        own = Signature(
-            np.array([candidate.bisector]), np.array([candidate.opening]), np.array([candidate.convex])
-        )
-        return bool(near) and bool(look_alike(own, signature_of(near)).any())
+        return bool(look_alike(signature_of([candidate.first]), signature_of(near)).any())
 
     def check(
-        self, scan: int, pose: ArrayLike, places: Array, angles: Array, ranges: Array, static: LogOddsGrid
+        self, scan: int, T_world_laser: ArrayLike, places: Array, seen: ScanLike, static: LogOddsGrid
     ) -> list[Landmark]:
         """Withdraw landmarks that beams went through three times running, or once where S lost them.
 
@@ -242,16 +221,21 @@ class LandmarkMap:
 
         Parameters
         ----------
-        scan, pose, places, static
+        scan, T_world_laser, places, static
             As for :meth:`choose`.
-        angles, ranges : ndarray, shape (b,)
+        seen : ScanLike
             The scan; readings that are not finite count as nothing seen.
+
+        Returns
+        -------
+        list of Landmark
+            Those withdrawn now.
         """
         active = self.active
         if not self.config.withdraw or not active:
             return []
         arms = np.stack([m.arms for m in active])
-        through = seen_through(pose, places, arms, angles, ranges, self.config.beyond)
+        through = seen_through(T_world_laser, places, arms, seen, self.config.beyond)
         held = static_along_arms(static, places, arms) >= self.config.arms_left
         gone = []
         for m, went, holds in zip(active, through, held, strict=True):
@@ -275,26 +259,42 @@ def signature_of(landmarks: list[Landmark]) -> Signature:
 
 
 def seen_through(
-    pose: ArrayLike, places: ArrayLike, arms: ArrayLike, angles: ArrayLike, ranges: ArrayLike, beyond: float,
+    T_world_laser: ArrayLike,
+    places: ArrayLike,
+    arms: ArrayLike,
+    scan: ScanLike,
+    beyond: float,
     along: float = 0.15,
-) -> BoolArray:  # fmt: skip
-    """Whether beams went through both arms of corners (n,).
+) -> BoolArray:
+    """Whether beams went through both arms of corners.
 
     A beam past the edge of a cupboard touches nothing, so the corner itself proves nothing: looked at is a
-    place on each arm, ``along`` metres from the corner.  All readings within one beam of its direction
-    must end at least ``beyond`` metres behind it.  A reading in front of it (somebody stands there) says
-    nothing.
+    place on each arm.  All readings within one beam of its direction must end at least ``beyond`` metres
+    behind it.  A reading in front of it (somebody stands there) says nothing.
+
+    Parameters
+    ----------
+    T_world_laser : array_like, shape (3,)
+        Pose (x, y, theta), metres and radians.
+    places, arms : array_like, shapes (n, 2), (n, 2)
+        Corners in the world, metres, and the directions of their arms, radians.
+    scan : ScanLike
+    beyond, along : float
+        Metres behind a place, and from the corner to it.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
-    pose, angles = np.asarray(pose, dtype=np.float64), np.asarray(angles, dtype=np.float64)
-    ranges, arms = np.asarray(ranges, dtype=np.float64), np.asarray(arms, dtype=np.float64).reshape(-1, 2)
-    places = np.asarray(places, dtype=np.float64).reshape(-1, 2)
-    spots = places[:, None] + along * np.stack([np.cos(arms), np.sin(arms)], -1)
+    pose, angles = np.asarray(T_world_laser, dtype=np.float64), np.asarray(scan.angles, dtype=np.float64)
+    ranges = np.asarray(scan.ranges, dtype=np.float64)
+    corners = np.asarray(places, dtype=np.float64).reshape(-1, 1, 2)
+    spots = corners + along * unit_vectors(np.reshape(arms, (-1, 2)))
     seen = se2.act(se2.inverse(pose), spots)
     distance, bearing = np.hypot(seen[..., 0], seen[..., 1]), np.arctan2(seen[..., 1], seen[..., 0])
     width = 1.5 * (angles[1] - angles[0]) if len(angles) > 1 else 0.0
-    through: BoolArray = np.zeros(distance.shape, dtype=np.bool_)
     usable = np.isfinite(ranges) & (ranges > 0)
-    for i in np.ndindex(distance.shape):
-        beside = usable & (np.abs(so2.wrap(angles - bearing[i])) <= width)
-        through[i] = beside.sum() >= 2 and bool(ranges[beside].min() > distance[i] + beyond)
+    beside = usable & (np.abs(so2.wrap(angles - bearing[..., None])) <= width)  # (n, 2, beams)
+    nearest = np.where(beside, ranges, np.inf).min(axis=-1, initial=np.inf)
+    through = (beside.sum(axis=-1) >= 2) & (nearest > distance + beyond)
     return np.asarray(through.all(axis=-1))

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,40 +21,28 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import so2
+from vslam_ref.grids.scan import unit_vectors
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class CornerConfig:
     """When two runs of a scan make a corner; every field says why it has its value."""
 
-    sigma: float = field(
-        default=0.015, metadata={"reason": "of a range, as the laser's data sheet has it", "unit": "m"}
-    )
-    usable_range: float = field(default=8.0, metadata={"reason": "half a degree is 7 cm there", "unit": "m"})
-    jump: float = field(
-        default=0.25, metadata={"reason": "half a door leaf; more parts two things", "unit": "m"}
-    )
-    bend: float = field(default=0.05, metadata={"reason": "three sigma: less is noise, no bend", "unit": "m"})
-    least_points: int = field(default=6, metadata={"reason": "a leg at 1.5 m gives five"})
-    least_length: float = field(default=0.25, metadata={"reason": "longer than a leg is wide", "unit": "m"})
-    least_angle: float = field(
-        default=0.7, metadata={"reason": "40 degrees: flatter corners lie anywhere", "unit": "rad"}
-    )
-    reach: float = field(default=0.15, metadata={"reason": "runs end this near to the corner", "unit": "m"})
-    floor: float = field(default=0.01, metadata={"reason": "walls are not straighter than that", "unit": "m"})
+    sigma: float = assume(0.015, "m", "of a range, as the laser's data sheet has it")
+    usable_range: float = assume(8.0, "m", "half a degree is 7 cm there")
+    jump: float = assume(0.25, "m", "half a door leaf; more parts two things")
+    bend: float = assume(0.05, "m", "three sigma: less is noise, no bend")
+    least_points: int = assume(6, "", "a leg at 1.5 m gives five")
+    least_length: float = assume(0.25, "m", "longer than a leg is wide")
+    least_angle: float = assume(0.7, "rad", "40 degrees: flatter corners lie anywhere")
+    reach: float = assume(0.15, "m", "runs end this near to the corner")
+    floor: float = assume(0.01, "m", "walls are not straighter than that")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        values = (
-            self.sigma,
-            self.usable_range,
-            self.jump,
-            self.bend,
-            self.least_length,
-            self.least_angle,
-            self.reach,
-        )
-        if not (np.isfinite(values).all() and min(values) > 0 and self.floor >= 0):
+        lengths = (self.sigma, self.usable_range, self.jump, self.bend, self.least_length, self.reach)
+        if not (np.isfinite(lengths).all() and min(*lengths, self.least_angle) > 0 and self.floor >= 0):
             raise ValueError("lengths and angles of a corner's config: need finite numbers > 0 (floor >= 0)")
         if self.least_points < 3:
             raise ValueError(f"least_points={self.least_points}: a line with an uncertainty needs at least 3")
@@ -158,7 +146,7 @@ def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike 
     """
     c, phi = np.asarray(centre, dtype=np.float64), np.asarray(angle, dtype=np.float64)
     offset = np.broadcast_to(np.asarray(offset, dtype=np.float64), phi.shape)
-    t = np.stack([np.cos(phi), np.sin(phi)], -1)
+    t = unit_vectors(phi)
     n = np.stack([-t[..., 1], t[..., 0]], -1)
     det = n[..., 0, 0] * n[..., 1, 1] - n[..., 0, 1] * n[..., 1, 0]
     inverse = np.stack(
@@ -177,27 +165,22 @@ def fit_lines(points: Array, beams: IntArray, runs: list[tuple[int, int]], sigma
 
     Implements :eq:`eq-line-variances`.
     """
-    centre, angle, offset, turn = (
-        np.empty((len(runs), 2)),
-        np.empty(len(runs)),
-        np.empty(len(runs)),
-        np.empty(len(runs)),
-    )
+    n = len(runs)
+    centre, angle, offset, turn = np.empty((n, 2)), np.empty(n), np.empty(n), np.empty(n)
     for i, (a, b) in enumerate(runs):
         p = points[a:b]
         centre[i] = p.mean(axis=0)
         d = p - centre[i]
         sxx, syy, sxy = d[:, 0] @ d[:, 0], d[:, 1] @ d[:, 1], d[:, 0] @ d[:, 1]
         phi = 0.5 * np.arctan2(2.0 * sxy, sxx - syy)
-        along = np.array([np.cos(phi), np.sin(phi)])
+        along = unit_vectors(phi)
         if along @ (p[-1] - p[0]) < 0.0:
             phi += np.pi
         angle[i] = so2.wrap(phi)
         offset[i] = sigma**2 / len(p)
         turn[i] = sigma**2 / max(float(((d @ along) ** 2).sum()), 1e-300)
-    ends = np.array([(beams[a], beams[b - 1]) for a, b in runs], dtype=np.int64).reshape(-1, 2)
-    ends_xy = np.array([(points[a], points[b - 1]) for a, b in runs]).reshape(-1, 2, 2)
-    return Lines(centre, angle, offset, turn, ends, ends_xy)
+    ends = np.array([(a, b - 1) for a, b in runs], dtype=np.int64).reshape(-1, 2)
+    return Lines(centre, angle, offset, turn, beams[ends], points[ends])
 
 
 def straight_runs(points: Array, config: CornerConfig) -> list[tuple[int, int]]:
@@ -216,11 +199,8 @@ def straight_runs(points: Array, config: CornerConfig) -> list[tuple[int, int]]:
         chord = points[b - 1] - points[a]
         length = float(np.hypot(*chord))
         d = points[a:b] - points[a]
-        off = (
-            np.abs(d[:, 0] * chord[1] - d[:, 1] * chord[0]) / length
-            if length > 0
-            else np.hypot(d[:, 0], d[:, 1])
-        )
+        area = np.abs(d[:, 0] * chord[1] - d[:, 1] * chord[0])
+        off = area / length if length > 0 else np.hypot(d[:, 0], d[:, 1])
         k = int(np.argmax(off))
         if off[k] > config.bend and 0 < k < b - a - 1:
             stack += [(a + k, b), (a, a + k + 1)]
@@ -265,7 +245,7 @@ def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | No
         )
     used = np.isfinite(ranges) & (ranges > 0.0) & (ranges <= c.usable_range)
     beams = np.flatnonzero(used)
-    points = ranges[used, None] * np.stack([np.cos(angles[used]), np.sin(angles[used])], 1)
+    points = ranges[used, None] * unit_vectors(angles[used])
     lines = fit_lines(points, beams, _long_runs(points, c), c.sigma)
     return _meet(lines, c)
 
@@ -293,6 +273,7 @@ def _meet(lines: Lines, c: CornerConfig) -> Corners:
     )
     near = (gap <= c.reach).all(axis=1)
     pair, xy, J_offset, J_angle = pair[near], at.value[near], at.J_offset[near], at.J_angle[near]
+    # eq-corner-cov
     cov = (J_offset * lines.var_offset[pair][:, None]) @ J_offset.swapaxes(1, 2)
     cov = cov + (J_angle * lines.var_angle[pair][:, None]) @ J_angle.swapaxes(1, 2) + c.floor**2 * np.eye(2)
     back, on = so2.wrap(lines.angle[pair[:, 0]] + np.pi), lines.angle[pair[:, 1]]

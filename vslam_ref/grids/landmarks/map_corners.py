@@ -11,39 +11,32 @@ sense of least squares, on all walls of the window: the corner, to a fraction of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.grids.log_odds import LogOddsGrid
+from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, LogOddsGrid
+from vslam_ref.grids.scan import unit_vectors
+from vslam_ref.support.config import assume
 
 
 @dataclass(frozen=True)
 class MapCornerConfig:
     """When the static map has a corner; every field says why it has its value."""
 
-    smooth: float = field(default=0.8, metadata={"reason": "hides the raster's steps", "unit": "cells"})
-    window: float = field(
-        default=2.0, metadata={"reason": "both arms, and not the next corner", "unit": "cells"}
-    )
-    least: float = field(
-        default=0.075, metadata={"reason": "a clean L has 0.095, the end of a wall 0.06, a wall 0"}
-    )
-    decided: float = field(default=0.9, metadata={"reason": "A: S and D are determined above 0.9"})
-    near: float = field(default=0.3, metadata={"reason": "two maxima of one corner", "unit": "m"})
+    smooth: float = assume(0.8, "cells", "hides the raster's steps")
+    window: float = assume(2.0, "cells", "both arms, and not the next corner")
+    least: float = assume(0.075, "", "a clean L has 0.095, the end of a wall 0.06, a wall 0")
+    decided: float = assume(0.9, "", "A: S and D are determined above 0.9")
+    near: float = assume(0.3, "m", "two maxima of one corner")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (
-            self.smooth > 0
-            and self.window > 0
-            and self.least > 0
-            and 0.5 < self.decided < 1
-            and self.near >= 0
-        ):
+        lengths = (self.smooth, self.window, self.least)
+        if not (min(lengths) > 0 and 0.5 < self.decided < 1 and self.near >= 0):
             raise ValueError("need smooth, window, least > 0, 0.5 < decided < 1 and near >= 0")
 
 
@@ -55,7 +48,7 @@ class MapCorners(NamedTuple):
 
 
 def certainty(grid: LogOddsGrid) -> Array:
-    """Q = max(2 P - 1, 0) of every cell: how sure it is that the cell is occupied."""
+    """Q = max(2 P - 1, 0) of every cell (rows, columns): how sure it is that the cell is occupied."""
     return np.maximum(2.0 * grid.probability - 1.0, 0.0)
 
 
@@ -139,17 +132,13 @@ def static_along_arms(grid: LogOddsGrid, xy: ArrayLike, arms: ArrayLike, length:
     """
     from scipy.ndimage import maximum_filter
 
-    xy, arms = (
-        np.asarray(xy, dtype=np.float64).reshape(-1, 2),
-        np.asarray(arms, dtype=np.float64).reshape(-1, 2),
-    )
+    xy, arms = (np.asarray(a, dtype=np.float64).reshape(-1, 2) for a in (xy, arms))
     if len(xy) == 0 or grid.log_odds.size == 0:
         return np.zeros(len(xy))
     s = np.arange(grid.resolution, length + 1e-9, grid.resolution / 2)
-    way = np.stack([np.cos(arms), np.sin(arms)], -1)
+    way = unit_vectors(arms)
     places = xy[:, None, None] + s[:, None] * way[:, :, None]
     best = LogOddsGrid(grid.lattice, maximum_filter(grid.log_odds, size=3))
-    decided = np.log(0.9 / 0.1)
-    static = (best.at(places.reshape(-1, 2)) > decided).reshape(len(xy), 2, len(s))
+    static = (best.at(places.reshape(-1, 2)) > DECIDED_LOG_ODDS).reshape(len(xy), 2, len(s))
     share: Array = static.mean(axis=2).min(axis=1)
     return share

@@ -11,7 +11,7 @@ something else).  Neither is the standard deviation ``sigma``, which weighs the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -22,9 +22,11 @@ from vslam_ref.estimation.robust import Tukey
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.field import (
     DistanceField,
+    pose_difference,
     sample,
     scan_residuals_with_jacobians,
 )
+from vslam_ref.support.config import assume
 
 FINE = 1e-4
 """Steps below this (m, rad) end the refinement: a hundredth of what the map resolves."""
@@ -37,29 +39,14 @@ Reason = Literal["converged", "too few points on the map", "no convergence"]
 class MatchConfig:
     """How a scan is matched; every field says why it has its value."""
 
-    sigma: float = field(
-        default=0.05,
-        metadata={"reason": "a cell's half side, with the range noise far below it", "unit": "m"},
-    )
-    cut: float = field(
-        default=0.1,
-        metadata={"reason": "a cell: what is farther off is something else; inf: nothing is", "unit": "m"},
-    )
-    search_cut: float = field(
-        default=0.3,
-        metadata={"reason": "a step of the box: 7 cm, and 17 cm more at 5 m", "unit": "m"},
-    )
-    window: float = field(
-        default=0.2, metadata={"reason": "twice the worst step of the odometry", "unit": "m"}
-    )
-    window_angle: float = field(
-        default=0.1, metadata={"reason": "four sigma of a step's turn", "unit": "rad"}
-    )
-    steps: int = field(
-        default=3, metadata={"reason": "tries on each side: 7 cm apart, inside the field's valley"}
-    )
-    least_points: int = field(default=10, metadata={"reason": "three unknowns, and robust weights to judge"})
-    iterations: int = field(default=20, metadata={"reason": "five suffice; more means no convergence"})
+    sigma: float = assume(0.05, "m", "a cell's half side, with the range noise far below it")
+    cut: float = assume(0.1, "m", "a cell: what is farther off is something else; inf: nothing is")
+    search_cut: float = assume(0.3, "m", "a step of the box: 7 cm, and 17 cm more at 5 m")
+    window: float = assume(0.2, "m", "twice the worst step of the odometry")
+    window_angle: float = assume(0.1, "rad", "four sigma of a step's turn")
+    steps: int = assume(3, "", "tries on each side: 7 cm apart, inside the field's valley")
+    least_points: int = assume(10, "", "three unknowns, and robust weights to judge")
+    iterations: int = assume(20, "", "five suffice; more means no convergence")
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -76,7 +63,7 @@ class Match(NamedTuple):
 
     Attributes
     ----------
-    pose : ndarray, shape (3,)
+    T_world_laser : ndarray, shape (3,)
         Most probable pose, prediction included.
     information : ndarray, shape (3, 3)
         J^T W J / sigma^2: of the scan alone; may be singular, as along a corridor.
@@ -84,10 +71,10 @@ class Match(NamedTuple):
         Points with a weight above one half.
     iterations : int
     reason : {"converged", "too few points on the map", "no convergence"}
-        With the second, ``pose`` is the prediction and ``information`` zero.
+        With the second, ``T_world_laser`` is the prediction and ``information`` zero.
     """
 
-    pose: Array
+    T_world_laser: Array
     information: Array
     inliers: int
     iterations: int
@@ -95,7 +82,9 @@ class Match(NamedTuple):
 
 
 def thin(points: ArrayLike, side: float) -> Array:
-    """Mean of the points in each square of the given side: readings that share a cell share its error.
+    """Mean (k, 2) of the points (n, 2) in each square of the given side, metres.
+
+    Readings that share a cell share its error.
 
     Examples
     --------
@@ -147,8 +136,7 @@ class Objective(NamedTuple):
         poses = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
         world = se2.act(poses[:, None], self.points)
         d = sample(world, self.field)
-        off = poses - self.predicted
-        off[:, 2] = so2.wrap(off[:, 2])
+        off = pose_difference(poses, self.predicted)
         misfit = self.loss.cost(d).sum(axis=1) / self.sigma**2
         total: Array = misfit + 0.5 * np.einsum("ki,ij,kj->k", off, self.prior, off)
         return total
@@ -166,9 +154,9 @@ def correlative(objective: Objective, config: MatchConfig) -> Array:
     box = np.stack(np.meshgrid(tries, tries, tries, indexing="ij"), -1).reshape(-1, 3)
     box = box[np.argsort((box**2).sum(axis=1), kind="stable")]
     poses = around + box * [c.window, c.window, c.window_angle]
-    pose: Array = poses[int(np.argmin(objective.cost(poses)))]
-    pose[2] = so2.wrap(pose[2])
-    return pose
+    T_world_laser: Array = poses[int(np.argmin(objective.cost(poses)))]
+    T_world_laser[2] = so2.wrap(T_world_laser[2])
+    return T_world_laser
 
 
 def match_scan(
@@ -201,41 +189,29 @@ def match_scan(
     c = MatchConfig() if config is None else config
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     predicted, cov = np.asarray(predicted, dtype=np.float64), np.asarray(cov, dtype=np.float64)
-    if (
-        predicted.shape != (3,)
-        or cov.shape != (3, 3)
-        or not (np.isfinite(predicted).all() and np.isfinite(cov).all())
-    ):
-        raise ValueError(
-            f"prediction {predicted.shape} and covariance {cov.shape}: need finite (3,) and (3, 3)"
-        )
+    shapes = predicted.shape, cov.shape
+    if shapes != ((3,), (3, 3)) or not (np.isfinite(predicted).all() and np.isfinite(cov).all()):
+        raise ValueError(f"prediction {shapes[0]} and covariance {shapes[1]}: need finite (3,) and (3, 3)")
     o = Objective(field, points, predicted, np.linalg.inv(cov), c.sigma, c.cut)
-    pose = correlative(o._replace(cut=c.search_cut), c)
-    now = float(o.cost(pose)[0])
+    T_world_laser = correlative(o._replace(cut=c.search_cut), c)
+    now = float(o.cost(T_world_laser)[0])
     for iteration in range(1, c.iterations + 1):
-        r = scan_residuals_with_jacobians(pose, points, field)
+        r = scan_residuals_with_jacobians(T_world_laser, points, field)
         d, J = r.value[:, 0], r.J_pose[:, 0]
         weight = o.loss.weight(d)
         inliers = int((weight > 0.5).sum())
         if inliers < c.least_points:
             return Match(predicted.copy(), np.zeros((3, 3)), inliers, iteration, "too few points on the map")
         information = (J * weight[:, None]).T @ J / c.sigma**2
-        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ _difference(pose, predicted)
+        slope = J.T @ (weight * d) / c.sigma**2 + o.prior @ pose_difference(T_world_laser, predicted)
         step = -np.linalg.solve(information + o.prior, slope)
         for share in SHARES:
-            tried = pose + share * step
+            tried = T_world_laser + share * step
             tried[2] = so2.wrap(tried[2])
             then = float(o.cost(tried)[0])
             if then < now:
                 break
         if then >= now or np.abs(share * step).max() < FINE:
-            return Match(pose, information, inliers, iteration, "converged")
-        pose, now = tried, then
-    return Match(pose, information, inliers, c.iterations, "no convergence")
-
-
-def _difference(a: Array, b: Array) -> Array:
-    """A - b, the angle in (-pi, pi]."""
-    off = a - b
-    off[2] = so2.wrap(off[2])
-    return off
+            return Match(T_world_laser, information, inliers, iteration, "converged")
+        T_world_laser, now = tried, then
+    return Match(T_world_laser, information, inliers, c.iterations, "no convergence")

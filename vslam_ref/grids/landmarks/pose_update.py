@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array
 from vslam_ref.filters.block_covariance import Blocks, Expected, kalman_update_in_place
 from vslam_ref.geometry import so2
+from vslam_ref.grids.landmarks.field import pose_difference
 
 WEAKEST = 1e-6
 """Eigenvalues below this share of the largest say nothing."""
 
 
 def pose_measurement(
-    pose: ArrayLike, information: ArrayLike, predicted: ArrayLike, cov: ArrayLike
+    T_world_laser: ArrayLike, information: ArrayLike, predicted: ArrayLike, cov: ArrayLike
 ) -> tuple[Array, Array, Array]:
     """Turn a match into a linear measurement H x = z with independent errors.
 
@@ -30,7 +31,7 @@ def pose_measurement(
 
     Parameters
     ----------
-    pose : array_like, shape (3,)
+    T_world_laser : array_like, shape (3,)
         Most probable pose x.
     information : array_like, shape (3, 3)
         A, of the scan alone.
@@ -46,8 +47,7 @@ def pose_measurement(
     variance : ndarray, shape (k,)
     """
     A, P = np.asarray(information, dtype=np.float64), np.asarray(cov, dtype=np.float64)
-    off = np.asarray(pose, dtype=np.float64) - np.asarray(predicted, dtype=np.float64)
-    off[2] = so2.wrap(off[2])
+    off = pose_difference(T_world_laser, predicted)
     values, vectors = np.linalg.eigh((A + A.T) / 2)
     known = values > WEAKEST * max(float(values.max()), 0.0)
     known &= values > 0.0

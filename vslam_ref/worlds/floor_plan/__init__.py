@@ -15,6 +15,7 @@ module          holds
 ``rays``        exact ray casting against segments and discs
 ``cells``       exact cover of a raster by segments and discs
 ``crowd``       people: goals, social force, legs
+``carts``       boxes that are pushed to and fro
 ``robot``       the route driven, and odometry
 ``recording``   ``simulate``: one run with everything that was true
 ``truth``       which cells are static, which are moving, which could be seen
@@ -27,11 +28,12 @@ stands still longer than T is static.
 **Crowd density** means: the share of the free floor that people's bodies cover.
 """
 
+from vslam_ref.worlds.floor_plan.carts import with_carts
 from vslam_ref.worlds.floor_plan.cells import Cells, cells_on_segments, disc_cells, segment_cells
 from vslam_ref.worlds.floor_plan.config import CrowdConfig, FloorPlanConfig, LaserConfig, RobotConfig
 from vslam_ref.worlds.floor_plan.plan import Box, Door, FloorPlan, hall, office
 from vslam_ref.worlds.floor_plan.rays import Hits, cast
-from vslam_ref.worlds.floor_plan.recording import Recording, Surfaces, simulate, turned, with_carts
+from vslam_ref.worlds.floor_plan.recording import Recording, Surfaces, simulate, turned
 from vslam_ref.worlds.floor_plan.truth import CellTruth, Seen, cell_truth, cover, seen_cells
 
 __all__ = [

@@ -7,9 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-
-def _assume(default: Any, unit: str, reason: str) -> Any:
-    return field(default=default, metadata={"unit": unit, "reason": reason})
+from vslam_ref.support.config import assume
 
 
 def _refuse_not_finite(config: Any) -> None:
@@ -28,24 +26,24 @@ class CrowdConfig:
     Free floor is the area of rooms and corridor less that of the furniture.
     """
 
-    density: float = _assume(
+    density: float = assume(
         0.2, "", "share of the free floor covered by bodies; 0.2 is one person per square metre"
     )
-    radius: float = _assume(0.25, "m", "half a shoulder's width: the body's disc")
-    legs: bool = _assume(True, "", "a laser at 0.3 m sees two legs; False: it sees the body's disc")
-    leg_radius: float = _assume(0.07, "m", "a leg with trousers, at half calf's height")
-    leg_gap: float = _assume(0.22, "m", "distance of the two legs' centres, across")
-    leg_swing: float = _assume(0.12, "m", "amplitude along the way; legs stay inside the body's disc")
-    stride: float = _assume(1.3, "m", "walked length of a full cycle of both legs")
-    speed: float = _assume(1.2, "m/s", "mean wish; usual walking pace indoors")
-    speed_spread: float = _assume(0.2, "m/s", "standard deviation between people; cut at two of them")
-    pause_most: float = _assume(4.0, "s", "pauses at a goal are uniform up to this; shorter than ``memory``")
-    leave: float = _assume(0.2, "", "chance that the next goal lies in another room")
-    patience: float = _assume(12.0, "s", "a goal not reached by then is given up")
-    relax: float = _assume(0.5, "s", "Helbing and Molnar: time to reach the wished velocity")
-    push: float = _assume(5.0, "m/s^2", "social force at contact; a body can accelerate at half g")
-    reach: float = _assume(0.15, "m", "length over which that force falls by e")
-    step: float = _assume(
+    radius: float = assume(0.25, "m", "half a shoulder's width: the body's disc")
+    legs: bool = assume(True, "", "a laser at 0.3 m sees two legs; False: it sees the body's disc")
+    leg_radius: float = assume(0.07, "m", "a leg with trousers, at half calf's height")
+    leg_gap: float = assume(0.22, "m", "distance of the two legs' centres, across")
+    leg_swing: float = assume(0.12, "m", "amplitude along the way; legs stay inside the body's disc")
+    stride: float = assume(1.3, "m", "walked length of a full cycle of both legs")
+    speed: float = assume(1.2, "m/s", "mean wish; usual walking pace indoors")
+    speed_spread: float = assume(0.2, "m/s", "standard deviation between people; cut at two of them")
+    pause_most: float = assume(4.0, "s", "pauses at a goal are uniform up to this; shorter than ``memory``")
+    leave: float = assume(0.2, "", "chance that the next goal lies in another room")
+    patience: float = assume(12.0, "s", "a goal not reached by then is given up")
+    relax: float = assume(0.5, "s", "Helbing and Molnar: time to reach the wished velocity")
+    push: float = assume(5.0, "m/s^2", "social force at contact; a body can accelerate at half g")
+    reach: float = assume(0.15, "m", "length over which that force falls by e")
+    step: float = assume(
         0.1, "s", "of the crowd's motion: 12 cm at walking pace, half the radius; split to fit scans"
     )
 
@@ -74,11 +72,11 @@ class CrowdConfig:
 class LaserConfig:
     """The range finder; it sits in the robot's reference point and looks ahead."""
 
-    beams: int = _assume(361, "", "one every 0.75 degree: 13 cm apart at 10 m, about a cell")
-    field_of_view: float = _assume(float(np.deg2rad(270.0)), "rad", "a usual indoor scanner's 270 degrees")
-    sigma: float = _assume(0.015, "m", "standard deviation of a range; indoor scanners give 10 to 30 mm")
-    max_range: float = _assume(10.0, "m", "beyond it nothing returns; the plan is 14 m long")
-    dropout: float = _assume(0.01, "", "share of beams without a reading: dark or slanted surfaces")
+    beams: int = assume(361, "", "one every 0.75 degree: 13 cm apart at 10 m, about a cell")
+    field_of_view: float = assume(float(np.deg2rad(270.0)), "rad", "a usual indoor scanner's 270 degrees")
+    sigma: float = assume(0.015, "m", "standard deviation of a range; indoor scanners give 10 to 30 mm")
+    max_range: float = assume(10.0, "m", "beyond it nothing returns; the plan is 14 m long")
+    dropout: float = assume(0.01, "", "share of beams without a reading: dark or slanted surfaces")
 
     def __post_init__(self) -> None:
         """Refuse lasers that cannot be."""
@@ -105,13 +103,13 @@ class RobotConfig:
     Gaussian errors of variance ``drift_ds^2 |ds|`` and ``drift_turn^2 |dalpha| + drift_heading^2 |ds|``.
     """
 
-    radius: float = _assume(0.3, "m", "people keep their bodies out of this disc")
-    speed: float = _assume(0.5, "m/s", "slow enough for a crowd")
-    turn_rate: float = _assume(0.8, "rad/s", "turns on the spot")
-    scan_period: float = _assume(0.2, "s", "five scans a second; the robot moves a cell between two")
-    drift_ds: float = _assume(0.05, "m^0.5", "5 cm per metre, 0.3 m after the route's 30 m")
-    drift_turn: float = _assume(0.05, "rad^0.5", "3 degrees per turn of 1 rad")
-    drift_heading: float = _assume(0.03, "rad/m^0.5", "1.7 degrees per metre: a wheel pair's slip")
+    radius: float = assume(0.3, "m", "people keep their bodies out of this disc")
+    speed: float = assume(0.5, "m/s", "slow enough for a crowd")
+    turn_rate: float = assume(0.8, "rad/s", "turns on the spot")
+    scan_period: float = assume(0.2, "s", "five scans a second; the robot moves a cell between two")
+    drift_ds: float = assume(0.05, "m^0.5", "5 cm per metre, 0.3 m after the route's 30 m")
+    drift_turn: float = assume(0.05, "rad^0.5", "3 degrees per turn of 1 rad")
+    drift_heading: float = assume(0.03, "rad/m^0.5", "1.7 degrees per metre: a wheel pair's slip")
 
     def __post_init__(self) -> None:
         """Refuse robots that cannot be."""
@@ -129,18 +127,18 @@ class FloorPlanConfig:
     crowd: CrowdConfig = field(default_factory=CrowdConfig)
     laser: LaserConfig = field(default_factory=LaserConfig)
     robot: RobotConfig = field(default_factory=RobotConfig)
-    plan: Literal["office", "hall", "depot"] = _assume(
+    plan: Literal["office", "hall", "depot"] = assume(
         "office", "", "five rooms and a corridor; hall: one room, for tests; depot: a bare room, for carts"
     )
-    memory: float = _assume(
+    memory: float = assume(
         10.0, "s", "T: a thing counts as moving while its pose changed within the last T seconds"
     )
-    moved_least: float = _assume(
+    moved_least: float = assume(
         0.05, "m", "a person who shifted less than this within T stands: swaying is no walk"
     )
-    carts: int = _assume(0, "", "boxes on wheels that are pushed to and fro: moving things with corners")
-    cart_speed: float = _assume(0.3, "m/s", "a trolley that somebody loads as it goes")
-    duration: float = _assume(1e9, "s", "stop after this long, or at the end of the route")
+    carts: int = assume(0, "", "boxes on wheels that are pushed to and fro: moving things with corners")
+    cart_speed: float = assume(0.3, "m/s", "a trolley that somebody loads as it goes")
+    duration: float = assume(1e9, "s", "stop after this long, or at the end of the route")
 
     def __post_init__(self) -> None:
         """Refuse floors that cannot be."""

@@ -108,7 +108,7 @@ class Crowd:
         raise ValueError(f"plan: {n} people find no place clear of walls and boxes in its zones")
 
     def zone_of(self, points: Array) -> IntArray:
-        """Index of the zone in which each point lies; 0 if it lies in none."""
+        """Index (n,) of the zone in which each point (n, 2), metres, lies; 0 if it lies in none."""
         z = self._plan.zones
         inside = (points[:, None] >= z[:, :2]) & (points[:, None] <= z[:, 2:])
         return np.asarray(np.argmax(inside.all(axis=2), axis=1), dtype=np.int64)

@@ -38,7 +38,7 @@ class Schedule(NamedTuple):
     values: Array
 
     def at(self, t: float) -> Array:
-        """Value at time t."""
+        """Value (...,) at time t, s."""
         i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 1))
         j = min(i + 1, len(self.times) - 1)
         if i == j or t <= self.times[0]:
@@ -56,7 +56,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(times: ArrayLike, values: ArrayLike) -> Schedule:
-    """Build a :class:`Schedule`; ``ValueError`` if times do not increase or the lengths differ."""
+    """Build a :class:`Schedule` of times (k,), s, that must increase, and values (k, ...)."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or len(t) == 0 or len(t) != len(v) or not np.isfinite(t).all() or np.any(np.diff(t) <= 0):
         raise ValueError(
@@ -99,17 +99,17 @@ class Box:
     ----------
     size : tuple of two floats
         Along its own x and y, metres.
-    pose : Schedule
+    T_world_box : Schedule
         Poses (x, y, theta) of its middle.
     """
 
     size: tuple[float, float]
-    pose: Schedule
+    T_world_box: Schedule
 
     def corners(self, t: float) -> Array:
         """Corners (4, 2) at time t, anticlockwise."""
         half = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * np.array(self.size) / 2
-        return se2.act(self.pose.at(t), half)
+        return se2.act(self.T_world_box.at(t), half)
 
     def segments(self, t: float) -> Array:
         """Its sides (4, 4) at time t."""
@@ -233,17 +233,9 @@ def office() -> FloorPlan:
                (11.55, 6.05, 5, 0.7))  # fmt: skip
     gates = tuple(Gate(zone, (x, y + d), (x, y - d), i) for i, (x, y, zone, d) in enumerate(middles))
     route = np.array(
-        [
-            [1.5, 1.5],
-            [3.55, 1.5],
-            [3.55, 5.05],
-            [10.55, 5.05],
-            [10.55, 2.5],
-            [10.55, 5.05],
-            [7.05, 5.05],
-            [7.05, 7.5],
-        ]
-    )
+        [[1.5, 1.5], [3.55, 1.5], [3.55, 5.05], [10.55, 5.05],
+         [10.55, 2.5], [10.55, 5.05], [7.05, 5.05], [7.05, 7.5]]
+    )  # fmt: skip
     return FloorPlan(walls, zones, route, furniture, (chair,), doors, gates)
 
 

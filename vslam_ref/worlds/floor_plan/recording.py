@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.filters import vehicle
 from vslam_ref.geometry import se2, so2
+from vslam_ref.worlds.floor_plan.carts import with_carts
 from vslam_ref.worlds.floor_plan.config import FloorPlanConfig
 from vslam_ref.worlds.floor_plan.crowd import Crowd, nearest_on_segments
-from vslam_ref.worlds.floor_plan.plan import PLANS, Box, FloorPlan, Schedule, schedule
+from vslam_ref.worlds.floor_plan.plan import PLANS, FloorPlan
 from vslam_ref.worlds.floor_plan.rays import cast
 from vslam_ref.worlds.floor_plan.robot import Odometry, drive, measure, true_increments
 
 FIXED = 0
 """Number of the object that never moves: walls and furniture together."""
+
+
+class LaserScan(NamedTuple):
+    """One scan: ``angles`` (b,), rad, ``ranges`` (b,), m, in the robot's frame; maximum range, m; time, s."""
+
+    angles: Array
+    ranges: Array
+    max_range: float
+    time: float
 
 
 class Surfaces(NamedTuple):
@@ -47,7 +59,7 @@ class Recording:
         With the carts that were drawn.
     times : ndarray, shape (n,)
         Seconds from the start.
-    poses : ndarray, shape (n, 3)
+    T_world_robot : ndarray, shape (n, 3)
         True poses ``T_world_robot`` (x, y, theta).
     odometry : Odometry
         n - 1 measured increments.
@@ -73,7 +85,7 @@ class Recording:
     config: FloorPlanConfig
     plan: FloorPlan
     times: Array
-    poses: Array
+    T_world_robot: Array
     odometry: Odometry
     angles: Array
     ranges: Array
@@ -92,6 +104,26 @@ class Recording:
     def surfaces(self, k: int) -> Surfaces:
         """What stands on the floor at scan k."""
         return Surfaces(self.segments[k], self.segment_owner, self.discs[k], self.disc_owner)
+
+    @property
+    def poses(self) -> Array:
+        """Short for ``T_world_robot``."""
+        return self.T_world_robot
+
+    def scan(self, k: int) -> LaserScan:
+        """Scan k as it was measured."""
+        return LaserScan(self.angles, self.ranges[k], self.config.laser.max_range, float(self.times[k]))
+
+    def increment(self, k: int) -> vehicle.Increment | None:
+        """What the odometry says of the way to scan k; None for the first one."""
+        if k == 0:
+            return None
+        u, cov = self.odometry.increment[k - 1], self.odometry.cov[k - 1]
+        return vehicle.Increment(u[:1].copy(), u[1:].copy(), cov[None].copy())
+
+    def way(self) -> Iterator[tuple[vehicle.Increment | None, LaserScan]]:
+        """Yield increment and scan of every moment, as the robot meets them."""
+        return ((self.increment(k), self.scan(k)) for k in range(len(self)))
 
     @property
     def share_on_people(self) -> float:
@@ -130,17 +162,18 @@ def simulate(config: FloorPlanConfig, rng: np.random.Generator, plan: FloorPlan 
     start, increments = true_increments(plan.route, config.robot)
     n = min(len(increments), int(config.duration / config.robot.scan_period))
     increments = increments[:n]
-    poses = drive(start, increments)
+    T_world_robot = drive(start, increments)
     times: Array = config.robot.scan_period * np.arange(n + 1, dtype=np.float64)
     segments = np.stack([np.concatenate([plan.fixed, plan.moved(t)]) for t in times])
-    _check_route(poses, times, segments, config.robot.radius)
-    people, discs, moved = _walk(plan, config, times, poses, for_crowd)
+    _check_route(T_world_robot, times, segments, config.robot.radius)
+    people, discs, moved = _walk(plan, config, times, T_world_robot, for_crowd)
     owners = _owners(plan, people.shape[1], discs.shape[1])
     moving = np.concatenate([_scheduled_moving(plan, times, config.memory), moved], axis=1)
-    ranges, exact, owner = _look(config, poses, segments, discs, owners, for_laser)
+    ranges, exact, owner = _look(config, T_world_robot, segments, discs, owners, for_laser)
+    odometry = measure(increments, config.robot, for_odometry)
     return Recording(
-        config, plan, times, poses, measure(increments, config.robot, for_odometry), config.laser.angles,
-        ranges, exact, owner, segments, owners[0], discs, owners[1], people, moving,
+        config, plan, times, T_world_robot, odometry, config.laser.angles, ranges, exact,
+        owner, segments, owners[0], discs, owners[1], people, moving,
     )  # fmt: skip
 
 
@@ -158,8 +191,8 @@ def _owners(plan: FloorPlan, people: int, discs: int) -> tuple[IntArray, IntArra
     return of_segments, FIXED + 1 + doors + things + np.repeat(np.arange(people), each)
 
 
-def _check_route(poses: Array, times: Array, segments: Array, radius: float) -> None:
-    for k, pose in enumerate(poses):
+def _check_route(T_world_robot: Array, times: Array, segments: Array, radius: float) -> None:
+    for k, pose in enumerate(T_world_robot):
         near = float(nearest_on_segments(pose[None, :2], segments[k])[1].min())
         if near < radius:
             raise ValueError(
@@ -169,7 +202,7 @@ def _check_route(poses: Array, times: Array, segments: Array, radius: float) -> 
 
 
 def _walk(
-    plan: FloorPlan, config: FloorPlanConfig, times: Array, poses: Array, rng: np.random.Generator
+    plan: FloorPlan, config: FloorPlanConfig, times: Array, T_world_robot: Array, rng: np.random.Generator
 ) -> tuple[Array, Array, BoolArray]:
     """People (n, p, 2), their discs (n, k, 3), and who moved within the last T seconds (n, p)."""
     period, dt = config.robot.scan_period, config.crowd.step
@@ -182,7 +215,7 @@ def _walk(
         if k >= 0:
             discs.append(crowd.discs())
         trail.append(crowd.position.copy())
-        here, there = poses[max(k, 0)], poses[min(max(k + 1, 0), len(poses) - 1)]
+        here, there = T_world_robot[max(k, 0)], T_world_robot[min(max(k + 1, 0), len(T_world_robot) - 1)]
         for i in range(substeps):
             robot = here[:2] + (i + 1) / substeps * (there[:2] - here[:2])
             crowd.step((k + i / substeps) * period, robot, config.robot.radius)
@@ -197,14 +230,14 @@ def _walk(
 
 def _scheduled_moving(plan: FloorPlan, times: Array, memory: float) -> BoolArray:
     """Whether fixed objects, doors and things changed within the last T seconds, (n, 1 + doors + things)."""
-    schedules = [door.angle for door in plan.doors] + [box.pose for box in plan.things]
+    schedules = [door.angle for door in plan.doors] + [box.T_world_box for box in plan.things]
     rows = [[False, *(s.changed(t, memory) for s in schedules)] for t in times]
     return np.array(rows, dtype=bool)
 
 
 def _look(
     config: FloorPlanConfig,
-    poses: Array,
+    T_world_robot: Array,
     segments: Array,
     discs: Array,
     owners: tuple[IntArray, IntArray],
@@ -212,9 +245,9 @@ def _look(
 ) -> tuple[Array, Array, IntArray]:
     """Measured ranges, exact ranges, and the object that each beam ends on; (n, b) each."""
     laser, owner_of = config.laser, np.concatenate(owners)
-    exact = np.empty((len(poses), laser.beams))
+    exact = np.empty((len(T_world_robot), laser.beams))
     owner = np.empty(exact.shape, dtype=np.int64)
-    for k, pose in enumerate(poses):
+    for k, pose in enumerate(T_world_robot):
         hits = cast(pose[:2], so2.wrap(pose[2] + laser.angles), segments[k], discs[k])
         far = hits.range > laser.max_range
         exact[k] = np.where(far, np.inf, hits.range)
@@ -224,81 +257,16 @@ def _look(
     return ranges, exact, owner
 
 
-CART = (0.8, 0.5)
-"""Metres; its corners lie 0.47 m from its middle."""
-CART_GAP = 0.1
-"""Metres between the circle around a cart and walls, things, other carts, and the robot."""
-
-
-def with_carts(
-    plan: FloorPlan, carts: int, rng: np.random.Generator, robot_radius: float = 0.3, speed: float = 0.3
-) -> FloorPlan:
-    """Add boxes on wheels, each pushed to and fro on a free straight line.
-
-    A cart stands for 12 to 25 s (the first time 4 to 15 s), then moves by 1 to 2.5 m, and so on.
-
-    Raises
-    ------
-    ValueError
-        If no free line is found for a cart in 5000 draws.
-    """
-    things = list(plan.things)
-    swept = [
-        box.segments(t) for box in plan.things for t in np.linspace(box.pose.times[0], box.pose.times[-1], 9)
-    ]
-    swept += [door.segment(t)[None] for door in plan.doors for t in np.linspace(0.0, 60.0, 61)]
-    fixed = np.concatenate([plan.fixed, *swept])
-    route = np.concatenate([plan.route[:-1], plan.route[1:]], axis=1)
-    radius = float(np.hypot(*CART)) / 2 + CART_GAP
-    lines = np.zeros((0, 4))
-    for _ in range(carts):
-        keep_off = ((fixed, radius), (lines, 2 * radius), (route, radius + robot_radius))
-        line = _free_line(plan, keep_off, rng)
-        lines = np.concatenate([lines, line.reshape(1, 4)])
-        things.append(Box(CART, _to_and_fro(line, speed, rng)))
-    return dataclasses.replace(plan, things=tuple(things))
-
-
-def _to_and_fro(line: Array, speed: float, rng: np.random.Generator, until: float = 200.0) -> Schedule:
-    """Poses of a cart on a line (2, 2)."""
-    way = line[1] - line[0]
-    heading, duration = float(np.arctan2(way[1], way[0])), float(np.hypot(*way)) / speed
-    t, at = float(rng.uniform(4.0, 15.0)), 0
-    times, values = [0.0], [[*line[0], heading]]
-    while t < until:
-        times += [t, t + duration]
-        values += [[*line[at], heading], [*line[1 - at], heading]]
-        at, t = 1 - at, times[-1] + float(rng.uniform(12.0, 25.0))
-    return schedule(times, values)
-
-
-def _free_line(plan: FloorPlan, keep_off: tuple[tuple[Array, float], ...], rng: np.random.Generator) -> Array:
-    """Ends (2, 2) of a line in one zone that stays away from segments by the given distances."""
-    for _ in range(5000):
-        zone = plan.zones[rng.integers(len(plan.zones))]
-        start = rng.uniform(zone[:2], zone[2:])
-        angle = rng.uniform(-np.pi, np.pi)
-        end = start + rng.uniform(1.0, 2.5) * np.array([np.cos(angle), np.sin(angle)])
-        if not ((end > zone[:2]).all() and (end < zone[2:]).all()):
-            continue
-        points = start + np.linspace(0.0, 1.0, 26)[:, None] * (end - start)
-        if all(nearest_on_segments(points, s)[1].min(initial=np.inf) > d for s, d in keep_off):
-            return np.stack([start, end])
-    raise ValueError(
-        "carts: no free straight line was found for one more; ask for fewer, or give a larger plan"
-    )
-
-
 def turned(recording: Recording, angle: float) -> Recording:
     """Return the same run in a world turned about the origin by ``angle`` (rad): rasters lie askew in it."""
-    pose = np.array([0.0, 0.0, angle])
+    T_new_old = np.array([0.0, 0.0, angle])
     segments = recording.segments.reshape(*recording.segments.shape[:-1], 2, 2)
     discs = recording.discs.copy()
-    discs[..., :2] = se2.act(pose, discs[..., :2])
+    discs[..., :2] = se2.act(T_new_old, discs[..., :2])
     return dataclasses.replace(
         recording,
-        poses=se2.compose(pose, recording.poses),
-        segments=se2.act(pose, segments).reshape(recording.segments.shape),
+        T_world_robot=se2.compose(T_new_old, recording.T_world_robot),
+        segments=se2.act(T_new_old, segments).reshape(recording.segments.shape),
         discs=discs,
-        people=se2.act(pose, recording.people),
+        people=se2.act(T_new_old, recording.people),
     )

@@ -62,10 +62,10 @@ def _steps(amount: float, most: float, axis: int) -> Array:
 
 def drive(start: ArrayLike, increments: ArrayLike) -> Array:
     """Poses (n + 1, 3) from a start pose by increments (n, 2)."""
-    poses = [np.asarray(start, dtype=np.float64)]
+    T_world_robot = [np.asarray(start, dtype=np.float64)]
     for increment in np.asarray(increments, dtype=np.float64):
-        poses.append(vehicle.propagate(poses[-1], increment))
-    return np.stack(poses)
+        T_world_robot.append(vehicle.propagate(T_world_robot[-1], increment))
+    return np.stack(T_world_robot)
 
 
 def measure(increments: ArrayLike, config: RobotConfig, rng: np.random.Generator) -> Odometry:

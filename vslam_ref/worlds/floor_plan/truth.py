@@ -70,12 +70,12 @@ def cell_truth(recording: Recording, k: int, cells: Cells) -> CellTruth:
 
 def seen_cells(recording: Recording, k: int, cells: Cells) -> Seen:
     """Which cells the laser could see at scan k."""
-    pose, exact = recording.poses[k], recording.exact_ranges[k]
+    T_world_robot, exact = recording.T_world_robot[k], recording.exact_ranges[k]
     met = np.isfinite(exact)
     reach = np.where(met, exact, recording.config.laser.max_range)
-    angle = so2.wrap(pose[2] + recording.angles)
-    ends = pose[:2] + reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    way = cells_on_segments(cells, np.broadcast_to(pose[:2], ends.shape), ends)
+    angle = so2.wrap(T_world_robot[2] + recording.angles)
+    ends = T_world_robot[:2] + reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    way = cells_on_segments(cells, np.broadcast_to(T_world_robot[:2], ends.shape), ends)
     last = np.append(way.segment[1:] != way.segment[:-1], True)
     crossed, ended = np.zeros(cells.shape, dtype=bool), np.zeros(cells.shape, dtype=bool)
     through = ~(last & met[way.segment])

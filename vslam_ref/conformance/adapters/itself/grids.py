@@ -70,14 +70,10 @@ def _config(
 
 
 def _look(layers: Array, now: float, observation: str, config: map_config.MapConfig) -> None:
-    steps = config.sensor.steps(config.d_high_where)
     end = [[3.5, 3.5]] if observation == "hit" else [[4.5, 3.5]]
-    beam = np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"])
-    where = static_dynamic.limits(config)
-    s, d, seen, last_hit, since = layers
-    static_dynamic.apply_scan(
-        s, d, seen, last_hit, since, SIDE, *beam, steps.static, steps.dynamic, where, now
-    )
+    beam = rays.BeamsInCells(np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"]))
+    rules = static_dynamic.rules_of(config)
+    static_dynamic.apply_scan(static_dynamic.Layers(*layers), SIDE, beam, rules, now)
 
 
 TABLE: Answers = {
