@@ -47,7 +47,7 @@ def test_same_steps_and_covariance(model: str, seed: int) -> None:
 
 
 def test_a_flipped_sign_is_another_algorithm(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The book with the poses' part of the reduced right side turned round: the first step makes no camera."""
+    """With the poses' part of the reduced right side turned round the first step makes no camera."""
     rng = np.random.default_rng(1)
     truth = CAMERAS["radtan"]
     T = boards.poses(BOARD, truth, SIZE, 5, rng)

@@ -31,7 +31,7 @@ def scene(seed: int, views: int, points: int) -> tuple[np.ndarray, np.ndarray, n
 
 @given(SEEDS, st.integers(2, 5))
 def test_points(seed: int, views: int) -> None:
-    """The fast form moves the world so that the centres lie around the origin at distance 1: so is the book's.
+    """The fast form moves the world: its centres lie around the origin at distance 1; so does the book.
 
     Rounding of the rows, 1e-16, over the gap of the two smallest singular values, about the parallax.
     """
