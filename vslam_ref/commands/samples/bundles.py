@@ -52,7 +52,7 @@ def make_bal(folder: Path, rng: np.random.Generator) -> Made:
         write_bal(folder / f"{name}.txt", BundleFile(one))
     command = "vslam-ref ba samples/bal/problem.txt"
     return Made(
-        BAL, (f"{command} --ply out.ply", f"{command} --loss tukey --scale 1.5"), _known(problem, 3 * 12)
+        BAL, (f"{command} --ply scene.ply", f"{command} --loss tukey --scale 1.5"), _known(problem, 3 * 12)
     )
 
 

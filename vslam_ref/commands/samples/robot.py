@@ -23,7 +23,7 @@ bearing.
 format: MRCLAM (UTIAS multi-robot localisation and mapping), one robot; each file names its columns
 true:   Robot1_Groundtruth.dat and Landmark_Groundtruth.dat, exact; truth.json has gains, offsets, delay and
         noises of the log. They are those that the library found in the real MRCLAM logs, and what
-        'vslam-ref run' takes by default: a consistent filter has a mean NEES of 3 here."""
+        'vslam-ref run' takes by default: a consistent filter has a mean NEES near 3 here."""
 
 
 def make(folder: Path, rng: np.random.Generator) -> Made:
