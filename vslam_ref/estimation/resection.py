@@ -11,6 +11,7 @@ start comes from :mod:`vslam_ref.geometry.multiview.resection`, one floor down, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from vslam_ref.arrays import Array, as_array
 from vslam_ref.estimation.least_squares import Options, Solution, minimise
 from vslam_ref.estimation.robust import Loss, norm_scale, tuned
 from vslam_ref.geometry import se3, so3
-from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.cameras import Camera, Projection, WorldProjectionJacobians
 from vslam_ref.geometry.multiview.resection import resect_linear, tilted_twin
 
 
@@ -137,28 +138,21 @@ def refine_pose(
         return _failed(camera, X, u, T, told)
 
     def residual(pose: Array) -> Array:
-        at = camera.pixel_from_world(pose, X)
-        r = (at.uv - u) / sigma[:, None]
-        return np.where(at.valid[:, None], r, np.nan).ravel()  # NaN: the solver takes another step
+        return _whitened(camera.pixel_from_world(pose, X), u, sigma)
 
     def with_jacobian(pose: Array) -> tuple[Array, Array]:
         at = camera.pixel_from_world_with_jacobians(pose, X)
-        r = (at.uv - u) / sigma[:, None]
-        J = at.J_pose / sigma[:, None, None]
-        return np.where(at.valid[:, None], r, np.nan).ravel(), J.reshape(-1, 6)
+        return _whitened(at, u, sigma), (at.J_pose / sigma[:, None, None]).reshape(-1, 6)
 
+    settings: Any = {"loss": loss, "block": 2, "plus": se3.perturb, "coordinates": 6}
     options = options or Options(max_iterations=200)
-    found = minimise(
-        residual,
-        T,
-        with_jacobian=with_jacobian,
-        loss=loss,
-        block=2,
-        plus=se3.perturb,
-        coordinates=6,
-        options=options,
-    )
+    found = minimise(residual, T, with_jacobian=with_jacobian, options=options, **settings)
     return _result(camera, X, u, found)
+
+
+def _whitened(at: Projection | WorldProjectionJacobians, u: Array, sigma: Array) -> Array:
+    """Residuals (2 N,) in standard deviations; NaN without an image: the solver takes another step."""
+    return np.where(at.valid[:, None], (at.uv - u) / sigma[:, None], np.nan).ravel()
 
 
 def resect(

@@ -7,8 +7,10 @@ One observation of point X in the view T with the intrinsics k::
     J_point (2, 3)
 
 The pinhole and the radial-tangential lens are written out here in columns, one array per quantity: it is what
-a problem of a hundred thousand observations spends its time on.  All other lenses go through
-:mod:`vslam_ref.geometry.cameras.projection`.  Both forms agree with it to rounding.
+a problem of a hundred thousand observations spends its time on.  In stacks of vectors and matrices,
+linearising takes 1.6 to 2.9 times as long, an iteration a third more, and the goals BA-1 and BA-2 would be
+missed.  All other lenses go through :mod:`vslam_ref.geometry.cameras.projection`.  Both forms agree with it
+to rounding.
 
 **Behind a camera there is no image.**  Such an observation is not ``valid``: its residual is zero and so are
 its Jacobians; what it costs is the loss's business.  The polynomial is used beyond the field in which it can

@@ -19,7 +19,7 @@ from typing import Generic, NamedTuple
 
 from vslam_ref.estimation.least_squares.options import Options
 from vslam_ref.estimation.least_squares.questions import Here, Place, Questions
-from vslam_ref.estimation.least_squares.result import Iteration, Reason
+from vslam_ref.estimation.least_squares.result import End, Iteration, Reason
 
 FLAT = 1e-8
 """A whole step that promises more than this share of the cost and brings nothing: no minimum, a mistake."""
@@ -32,9 +32,6 @@ class Descent(NamedTuple, Generic[Here]):
     reason: Reason
     message: str
     history: tuple[Iteration, ...]
-
-
-End = tuple[Reason, str]
 
 
 class _Trial(NamedTuple, Generic[Here]):
@@ -92,9 +89,9 @@ def descend(
         there, end = trial.there, trial.end
         if there is None and end is not None:
             return Descent(here, *end, tuple(history))
-        cost = trial.cost if there is not None else float(here.costs.sum())
-        judged = (state.value, trial.gain, there is not None)
-        history.append(Iteration(cost, trial.decrease, here.gradient_norm, trial.length, *judged))
+        cost, taken = (trial.cost, True) if there is not None else (float(here.costs.sum()), False)
+        row = (cost, trial.decrease, here.gradient_norm, trial.length, state.value, trial.gain, taken)
+        history.append(Iteration(*row))
         progress(history[-1])
         if there is None:
             grown = rule.failure(state)

@@ -11,6 +11,8 @@ from vslam_ref.estimation.least_squares.linear import Covariance, covariance
 Reason = Literal[
     "gradient", "step", "cost", "max_iterations", "stalled", "singular", "not_finite", "no_residuals"
 ]
+End = tuple[Reason, str]
+"""Why a descent ended, in a word and in a sentence."""
 CONVERGED: tuple[Reason, ...] = ("gradient", "step", "cost")
 
 

@@ -31,6 +31,7 @@ class Views:
 
     Examples
     --------
+    >>> from vslam_ref.geometry import se3
     >>> from vslam_ref.geometry.cameras import Pinhole
     >>> views = Views(Pinhole(500, 500, 320, 240), [se3.identity(), se3.exp([-1.0, 0, 0, 0, 0, 0])])
     >>> views.project([[0.0, 0.0, 5.0]]).uv.tolist()
