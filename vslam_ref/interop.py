@@ -156,19 +156,28 @@ def tangent_matrix(source: str, target: str, adjoint: ArrayLike, *, of_inverse: 
 
 
 def convert_covariance(cov: ArrayLike, M: ArrayLike) -> Array:
-    """Covariance in the target's tangent vectors and units: M cov M^T, shapes (..., n, n)."""
+    """Covariance in the target's tangent vectors and units: M cov M^T.
+
+    ``cov (..., n, n)``, ``M (..., n, n)``.
+    """
     M = as_array("M", M)
     return np.asarray(M @ as_array("cov", cov) @ transpose(M))
 
 
 def convert_information(information: ArrayLike, M: ArrayLike) -> Array:
-    """Information matrix (inverse covariance) in the target's vectors and units: M^-T L M^-1, (..., n, n)."""
+    """Information matrix (inverse covariance) in the target's vectors and units: M^-T L M^-1.
+
+    ``information (..., n, n)``, ``M (..., n, n)``.
+    """
     back = _inverse(as_array("M", M))
     return np.asarray(transpose(back) @ as_array("information", information) @ back)
 
 
 def convert_jacobian(J: ArrayLike, M: ArrayLike) -> Array:
-    """Jacobian (..., m, n) whose columns are the target's tangent directions and units: J M^-1."""
+    """Jacobian whose columns are the target's tangent directions and units: J M^-1.
+
+    ``J (..., m, n)``, ``M (..., n, n)``.
+    """
     return np.asarray(as_array("J", J) @ _inverse(as_array("M", M)))
 
 

@@ -89,6 +89,7 @@ def similarity_coefficients(sigma: Array, theta2: Array) -> tuple[Array, Array, 
     small = kappa < SMALL**2
     k = np.where(small, 1.0, kappa)
     e = np.exp(sigma)
+    # eq-w-matrix
     B = (sigma * (e * c[1] - A * c[0]) + theta2 * c[2]) / k
     C = (sigma * e * c[2] + A - e * c[1]) / k
     B_small, C_small = _power_sums(np.where(small, sigma, 0.0), np.where(small, theta2, 0.0))
@@ -107,7 +108,9 @@ def _power_sums(sigma: Array, theta2: Array) -> tuple[Array, Array]:
 
 
 def inverse_coefficients(A: Array, B: Array, C: Array, theta2: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of (A I + B Phi + C Phi^2)^-1 in the same basis, all of shape (...); theta2 in rad^2.
+    """Coefficients of (A I + B Phi + C Phi^2)^-1 in the same basis.
+
+    ``A (...)``, ``B (...)``, ``C (...)``; ``theta2 (...)`` in rad^2.
 
     The matrix has the eigenvalues A and A - theta^2 C +- i theta B; D is the squared length of the latter.
     """
@@ -117,7 +120,7 @@ def inverse_coefficients(A: Array, B: Array, C: Array, theta2: Array) -> tuple[A
 
 
 def rotation_polynomial(a: Array, b: Array, c: Array, Phi: Array) -> Array:
-    """Sum a I + b Phi + c Phi^2, coefficients (...) and Phi (..., 3, 3)."""
+    """Sum a I + b Phi + c Phi^2 of ``a (...)``, ``b (...)``, ``c (...)`` and ``Phi (..., 3, 3)``."""
     M: Array = b[..., None, None] * Phi + c[..., None, None] * (Phi @ Phi)
     for i in range(3):
         M[..., i, i] += a

@@ -47,7 +47,7 @@ def canonical(q: ArrayLike) -> Array:
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
-    """Hamilton's product, shapes (..., 4): first b, then a.
+    """Hamilton's product of ``a (..., 4)`` and ``b (..., 4)``: first b, then a.
 
     >>> compose([0, 1, 0, 0], [0, 0, 1, 0]).tolist()  # i j = k
     [0.0, 0.0, 0.0, 1.0]

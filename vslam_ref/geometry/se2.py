@@ -77,7 +77,7 @@ def vee(M: ArrayLike) -> Array:
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
     """Pose vector of the product ``T_a T_b`` (the seed's circled plus), shapes (..., 3).
 
-    Elements T_a_b and T_b_c give T_a_c.  Translations in metres.
+    Elements ``a (..., 3)`` and ``b (..., 3)``: T_a_b and T_b_c give T_a_c.  Translations in metres.
     """
     a, b = as_array("a", a, 3), as_array("b", b, 3)
     t = a[..., :2] + so2.rotate(a[..., 2], b[..., :2])
@@ -97,7 +97,7 @@ def inverse(pose: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """Pose of b seen from a, ``T_a^-1 T_b``, shapes (..., 3).
 
-    Elements T_w_a and T_w_b give T_a_b.  Translations in metres.
+    Elements ``a (..., 3)`` and ``b (..., 3)``: T_w_a and T_w_b give T_a_b.  Translations in metres.
     """
     return compose(inverse(a), b)
 
@@ -187,7 +187,9 @@ def left_jacobian_inverse(xi: ArrayLike) -> Array:
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Point at ``fraction`` in [0, 1] of the constant-velocity motion from pose a to pose b.
+    """Point at ``fraction (...)`` in [0, 1] of the motion at constant velocity from a to b.
+
+    Poses ``a (..., 3)`` and ``b (..., 3)`` of one frame.
 
     Elements and result ``(..., 3)`` map to the same frame; ``fraction (...)`` has no unit.  Translations in
     metres.
@@ -197,7 +199,7 @@ def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
 
 
 def perturb(pose: ArrayLike, xi: ArrayLike) -> Array:
-    """Pose vector of Exp(xi) T, shapes (..., 3).
+    """Pose vector of Exp(xi) T, ``pose (..., 3)`` and ``xi (..., 3)``.
 
     The tangent vector is xi = (rho, phi) in metres and radians, in the frame a of T_a_b.
     """

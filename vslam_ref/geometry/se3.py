@@ -113,7 +113,7 @@ def log(T: ArrayLike) -> Array:
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
     """Product T_a T_b, shapes (..., 4, 4).
 
-    Elements T_a_b and T_b_c give T_a_c.  Translations in metres.
+    Elements ``a (..., 4, 4)`` and ``b (..., 4, 4)``: T_a_b and T_b_c give T_a_c.  Translations in metres.
     """
     return np.asarray(as_array("a", a, 4, 4) @ as_array("b", b, 4, 4))
 
@@ -130,7 +130,7 @@ def inverse(T: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """T_a^-1 T_b, shapes (..., 4, 4).
 
-    Elements T_w_a and T_w_b give T_a_b.  Translations in metres.
+    Elements ``a (..., 4, 4)`` and ``b (..., 4, 4)``: T_w_a and T_w_b give T_a_b.  Translations in metres.
     """
     return compose(inverse(a), b)
 

@@ -159,7 +159,7 @@ def inverse(S: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """S_a^-1 S_b, shapes (..., 4, 4).
 
-    Elements T_w_a and T_w_b give T_a_b.  Translations in metres.
+    Elements ``a (..., 4, 4)`` and ``b (..., 4, 4)``: T_w_a and T_w_b give T_a_b.  Translations in metres.
     """
     return compose(inverse(a), b)
 

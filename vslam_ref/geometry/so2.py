@@ -108,7 +108,7 @@ def vee(Phi: ArrayLike) -> Array:
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
     """Product R_a R_b, shapes (..., 2, 2).
 
-    Elements T_a_b and T_b_c give T_a_c.
+    Elements ``a (..., 2, 2)`` and ``b (..., 2, 2)``: T_a_b and T_b_c give T_a_c.
     """
     return np.asarray(as_array("a", a, 2, 2) @ as_array("b", b, 2, 2))
 
@@ -124,7 +124,7 @@ def inverse(R: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """R_a^-1 R_b, shapes (..., 2, 2).
 
-    Elements T_w_a and T_w_b give T_a_b.
+    Elements ``a (..., 2, 2)`` and ``b (..., 2, 2)``: T_w_a and T_w_b give T_a_b.
     """
     return compose(inverse(a), b)
 

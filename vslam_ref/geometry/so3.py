@@ -101,7 +101,7 @@ def log(R: ArrayLike) -> Array:
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
     """Product R_a R_b, shapes (..., 3, 3).
 
-    Elements T_a_b and T_b_c give T_a_c.
+    Elements ``a (..., 3, 3)`` and ``b (..., 3, 3)``: T_a_b and T_b_c give T_a_c.
     """
     return np.asarray(as_array("a", a, 3, 3) @ as_array("b", b, 3, 3))
 
@@ -117,7 +117,7 @@ def inverse(R: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """R_a^-1 R_b, shapes (..., 3, 3).
 
-    Elements T_w_a and T_w_b give T_a_b.
+    Elements ``a (..., 3, 3)`` and ``b (..., 3, 3)``: T_w_a and T_w_b give T_a_b.
     """
     return compose(inverse(a), b)
 

@@ -187,7 +187,7 @@ def undistort(k: ArrayLike, xd: ArrayLike) -> Rays:
     def grow(theta: Array, at: IntArray) -> tuple[Array, Array]:
         p = theta * theta
         kappa, slope = _kappa(of(batch.k, at), p)
-        return theta * kappa, kappa + 2 * p * slope
+        return theta * kappa, kappa + 2 * p * slope  # eq-fisheye
 
     size = np.hypot(batch.xd[:, 0], batch.xd[:, 1])
     valid = size < grow(edge, np.arange(len(edge)))[0]  # false for NaN

@@ -12,14 +12,14 @@ from vslam_ref.geometry.cameras.camera import Camera
 
 
 class ImageMap(NamedTuple):
-    """For every pixel of the new image the place in the recorded one, (H, W, 2), and whether there is one."""
+    """Where a new image's pixels lie in the recorded one: ``uv (H, W, 2)``, pixels, if ``valid (H, W)``."""
 
     uv: Array
     valid: BoolArray
 
 
 class Samples(NamedTuple):
-    """Interpolated values (..., channels if any) and whether all that was needed lay in the image (...)."""
+    """Grey values or channels (..., channels if any), no unit, and whether they lay in the image (...)."""
 
     values: Array
     inside: BoolArray

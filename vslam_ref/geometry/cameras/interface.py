@@ -36,7 +36,7 @@ class Projection(NamedTuple):
 
 
 class ProjectionJacobians(NamedTuple):
-    """A projection with Jacobians in the point (..., 2, 3) and in all n intrinsics (..., 2, n)."""
+    """``uv (..., 2)`` in pixels, ``valid (...)``, ``J_point (..., 2, 3)``, ``J_intrinsics (..., 2, n)``."""
 
     uv: Array
     valid: BoolArray
@@ -45,7 +45,11 @@ class ProjectionJacobians(NamedTuple):
 
 
 class WorldProjectionJacobians(NamedTuple):
-    """Projection of a world point; J_pose (..., 2, 6) is for T <- Exp(xi) T with xi = (rho, phi)."""
+    """Projection of a world point: ``uv (..., 2)`` in pixels, ``valid (...)``, and its Jacobians.
+
+    ``J_pose (..., 2, 6)`` is for T <- Exp(xi) T with xi = (rho, phi); ``J_point (..., 2, 3)``;
+    ``J_intrinsics (..., 2, n)``.
+    """
 
     uv: Array
     valid: BoolArray
@@ -55,7 +59,7 @@ class WorldProjectionJacobians(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Unit bearings in the camera's frame (..., 3) and whether the model has a ray for the pixel."""
+    """Unit ``bearing (..., 3)`` in the camera's frame; ``valid (...)``: the model has a ray for the pixel."""
 
     bearing: Array
     valid: BoolArray
@@ -67,7 +71,7 @@ class Rays(NamedTuple):
 
 
 class RayJacobians(NamedTuple):
-    """Unit bearings, their validity, and the Jacobian in the pixel (..., 3, 2)."""
+    """Unit ``bearing (..., 3)``, ``valid (...)``, and ``J_pixel (..., 3, 2)`` per pixel."""
 
     bearing: Array
     valid: BoolArray
@@ -82,7 +86,7 @@ class Distorted(NamedTuple):
 
 
 class DistortedJacobians(NamedTuple):
-    """The same with Jacobians in the point (..., 2, 3) and in the lens's k parameters (..., 2, k)."""
+    """``xd (..., 2)``, ``valid (...)``, ``J_point (..., 2, 3)``, ``J_lens (..., 2, k)``; no unit."""
 
     xd: Array
     valid: BoolArray

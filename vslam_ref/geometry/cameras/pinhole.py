@@ -34,7 +34,10 @@ def distort(k: ArrayLike, X_cam: ArrayLike) -> Distorted:
 
 
 def distort_jacobian(k: ArrayLike, X_cam: ArrayLike) -> DistortedJacobians:
-    """:func:`distort` and its Jacobian (..., 2, 3) in the point: [[1, 0, -x/z], [0, 1, -y/z]] / z."""
+    """:func:`distort`, ``k (..., 0)``, and its Jacobian (..., 2, 3) in the point, per unit of X.
+
+    [[1, 0, -x/z], [0, 1, -y/z]] / z.
+    """
     return normalise_jacobian(X_cam)
 
 
