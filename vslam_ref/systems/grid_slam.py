@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.filters import observation
+from vslam_ref.filters.block_covariance import diagonal_blocks
 from vslam_ref.filters.ekf_slam import EkfSlam
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.geometry import se2, so2
@@ -216,7 +216,8 @@ class GridSlam:
         h, S = self._predicted()
         world = Signature(so2.wrap(b.x_p[0, 2] + corners.bisector), corners.opening, corners.convex)
         alike = look_alike(world, self.landmarks.signature())
-        which = associate(corners.xy[:, None] - h, S + corners.cov[:, None], alike).landmark
+        S = S + corners.cov[:, None]  # eq-gate-cov
+        which = associate(corners.xy[:, None] - h, S, alike).landmark
         rows = np.flatnonzero(which >= 0)
         ids = np.array([active[k].id for k in which[rows]], dtype=np.int64)
         if len(rows):
@@ -228,14 +229,11 @@ class GridSlam:
         return landmark
 
     def _predicted(self) -> tuple[Array, Array]:
-        """Active landmarks as seen from the pose (n, 2), metres, and H P H^T of each (n, 2, 2)."""
-        b, own = self.filter.blocks, self._columns()[:, None] + np.arange(2)
-        H = observation.vehicle_from_world_with_jacobians(b.x_p[0], self.places())
-        P_pl = b.P_pm[0][:, own].transpose(1, 0, 2)
-        P_ll = b.P_mm[0][own[:, :, None], own[:, None, :]]
-        cross = H.J_pose @ P_pl @ H.J_landmark.swapaxes(1, 2)
-        S = H.J_pose @ b.P_pp[0] @ H.J_pose.swapaxes(1, 2) + cross + cross.swapaxes(1, 2)  # eq-gate-cov
-        return H.value, S + H.J_landmark @ P_ll @ H.J_landmark.swapaxes(1, 2)
+        """Active landmarks as seen from the pose (n, 2), metres, and H P H^T of each (n, 2, 2), m^2."""
+        ids = [m.id for m in self.landmarks.active]
+        seen = self.filter.innovation(ids, np.zeros((1, len(ids), 2)), np.zeros((2, 2)))
+        assert seen is not None, "every active landmark is in the filter"
+        return -seen.innovation.reshape(-1, 2), diagonal_blocks(seen.S)[0]
 
     def _choose(self, corners: Corners, landmark: IntArray) -> IntArray:
         """Let unclaimed corners become landmarks, and put these into the filter."""
