@@ -94,6 +94,15 @@ def whiten(S, L, W):
 
 
 @njit(cache=True)
+def add_noise(cov_z, S):
+    """Covariances (m, 2, 2) of independent measurements onto the diagonal of S."""
+    for j in range(cov_z.shape[0]):
+        for r in range(2):
+            for q in range(2):
+                S[2 * j + r, 2 * j + q] += cov_z[j, r, q]
+
+
+@njit(cache=True)
 def apply_gate(gate, W):
     """Nothing of the whitened W is left where its last column, L^-1 innovation, is longer than the gate."""
     squared, last = 0.0, W.shape[1] - 1

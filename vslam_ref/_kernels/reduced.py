@@ -7,6 +7,7 @@ from numba import types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    add_noise,
     apply_gate,
     check_rows,
     gain,
@@ -189,14 +190,13 @@ def _add_noise(re, im, NE, even, odd):
 
 
 @njit(cache=True)
-def _add_noise_and_two(re, im, noise, tile, first, second, even, odd):
-    """:func:`_add_noise`, and minus four rows of W; ``first``, ``second`` are W in the columns of the two."""
-    f, g, s, t = noise[0], noise[1], noise[2], noise[3]
-    u, v, w, x = tile[0], tile[1], tile[2], tile[3]
-    p, q, m, n = first[0], first[1], first[2], first[3]
+def _add_noise_and_two(re, im, rows, W, r, even, odd):
+    """:func:`_add_noise`, and minus four rows of W; ``rows`` are four of NE and four of W, a tile of each."""
+    f, g, s, t, u, v, w, x = rows
+    p, q, m, n = W[0, r], W[1, r], W[2, r], W[3, r]
     for c in range(even.shape[0]):
         even[c] += (re * f[c] - im * g[c] + s[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
-    p, q, m, n = second[0], second[1], second[2], second[3]
+    p, q, m, n = W[0, r + 1], W[1, r + 1], W[2, r + 1], W[3, r + 1]
     for c in range(odd.shape[0]):
         odd[c] += (im * f[c] + re * g[c] + t[c]) - p * u[c] - q * v[c] - m * w[c] - n * x[c]
 
@@ -212,12 +212,13 @@ def _change_map(W, tile, E, NE, noise, b, P_mm):
         hi = min(M, lo + TILE)
         load_tile(W, lo, tile)
         load_tile(NE, lo, noise)
+        rows = noise[0], noise[1], noise[2], noise[3], tile[0], tile[1], tile[2 % k], tile[3 % k]
         for r in range(0, M, 2):
             even, odd = in_one_piece(P_mm[r])[lo:hi], in_one_piece(P_mm[r + 1])[lo:hi]
             first, re, im = 0, E[0, r], E[0, r + 1]
             if r % b == 0 and k >= 4:
                 first = 4
-                _add_noise_and_two(re, im, noise, tile, W[:4, r], W[:4, r + 1], even, odd)
+                _add_noise_and_two(re, im, rows, W, r, even, odd)
             elif r % b == 0:
                 _add_noise(re, im, noise, even, odd)
             shrink_rows(W, tile, first, r, even, odd)
@@ -291,8 +292,7 @@ def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, in
             innovation[run, 2 * j + 1] = z[run, j, 1] - predicted.imag
         _turn_pairs(c, columns, W, S[run])
         W[:, M + 4] = innovation[run]
-        for j in range(columns.shape[0]):
-            S[run, 2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += cov_z[j]
+        add_noise(cov_z, S[run])
         whiten(S[run], L, W)
         apply_gate(gate, W)
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])

@@ -7,6 +7,7 @@ from numba import types
 
 from vslam_ref._kernels._blocks import (
     TILE,
+    add_noise,
     apply_gate,
     check_rows,
     gain,
@@ -103,9 +104,7 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, 
             dx, dy = w[columns[j]] - w[M], w[columns[j] + 1] - w[M + 1]
             S[a, 2 * j] = c * dx + s * dy + left * w[M + 2]
             S[a, 2 * j + 1] = c * dy - s * dx - ahead * w[M + 2]
-        for r in range(2):
-            for q in range(2):
-                S[2 * j + r, 2 * j + q] += cov_z[j, r, q]
+    add_noise(cov_z, S)
     whiten(S, L, W)
     apply_gate(gate, W)
     gain(W, x_p, x_m, P_pp, P_pm)

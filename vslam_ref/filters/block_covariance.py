@@ -11,6 +11,7 @@ measurement of k numbers costs O(k n^2).  No full F, H or K H is ever formed.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +37,20 @@ class State(NamedTuple):
     P_mm: Array
 
 
+def _with_room(A: Array, *shape: int) -> Array:
+    """A and zeros behind it, rows an odd number of cache lines (8 numbers) apart, the first on a line.
+
+    Rows a power of two apart would share sets of the cache: a tenth of Numba's update at 200 landmarks.
+    """
+    row = 8 * (-(-shape[-1] // 8) | 1)
+    size = math.prod(shape[:-1]) * row
+    buffer = np.zeros(size + 7)
+    first = -(buffer.ctypes.data // 8) % 8
+    larger = buffer[first : first + size].reshape(*shape[:-1], row)[..., : shape[-1]]
+    larger[tuple(slice(length) for length in A.shape)] = A
+    return larger
+
+
 class Blocks:
     """Mean and covariance of pose and map for a batch of B runs, with room for a growing map.
 
@@ -59,9 +74,9 @@ class Blocks:
     def __init__(self, mean: Array, cov: Array, landmark_states: int, capacity: int) -> None:
         (batch, p), room = mean.shape, max(capacity, 1) * landmark_states
         self.b = landmark_states
-        self._x_m = np.zeros((batch, room))
-        self._P_pm = np.zeros((batch, p, room))
-        self._P_mm = np.zeros((batch, room, room))
+        self._x_m = _with_room(np.zeros((batch, 0)), batch, room)
+        self._P_pm = _with_room(np.zeros((batch, p, 0)), batch, p, room)
+        self._P_mm = _with_room(np.zeros((batch, 0, 0)), batch, room, room)
         self._index: dict[int, int] = {}
         self._look(np.array(mean, dtype=np.float64), np.array(cov, dtype=np.float64))
 
@@ -144,12 +159,12 @@ class Blocks:
     def _make_room(self, states: int) -> None:
         """Twice the room at least, when there is not enough for so many map states."""
         room = self._x_m.shape[1]
-        if states <= room:
-            return
-        more = (0, max(states, 2 * room) - room)
-        self._x_m = np.pad(self._x_m, ((0, 0), more))
-        self._P_pm = np.pad(self._P_pm, ((0, 0), (0, 0), more))
-        self._P_mm = np.pad(self._P_mm, ((0, 0), more, more))
+        if states > room:
+            more = max(states, 2 * room)
+            batch, p, _ = self._P_pm.shape
+            self._x_m = _with_room(self._x_m, batch, more)
+            self._P_pm = _with_room(self._P_pm, batch, p, more)
+            self._P_mm = _with_room(self._P_mm, batch, more, more)
 
     def full(self) -> tuple[Array, Array]:
         """Mean (B, p + M) and covariance (B, p + M, p + M) as whole arrays (copies)."""
