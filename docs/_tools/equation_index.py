@@ -171,7 +171,8 @@ def main(arguments: list[str]) -> int:
         return 0
     if arguments == ["--uncited"]:
         uncited = uncited_labels()
-        print("\n".join(f"{number}  {label}" for number, labels in uncited.items() for label in labels))
+        for number, labels in uncited.items():
+            print(*(f"{number}  {label}" for label in labels), sep="\n")
         return 1 if uncited else 0
     problems = unknown_items(citations())
     if arguments == ["--write"]:

@@ -85,31 +85,27 @@ def test_the_stored_digests_are_those_of_the_sources() -> None:
 def test_a_pair_reaches_what_it_imports() -> None:
     """Also through a package's ``__init__``, but not what stands beside the imported name there."""
     pairs = dict(bless.pairs())
-    assert {"filters/ekf_step.py", "geometry/so2.py", "_kernels/slam.py", "_kernels/_blocks.py"} <= set(
-        pairs["slam:ekf_update"]
+    assert {"filters/vehicle.py", "geometry/so2.py", "_kernels/slam.py", "_kernels/_blocks.py"} <= set(
+        pairs["slam:ekf_update_in_place"]
     )
-    assert not [name for name in pairs["slam:ekf_update"] if "cameras" in name]
+    assert not [name for name in pairs["slam:ekf_update_in_place"] if "cameras" in name]
     assert all("_kernels/__init__.py" not in files for files in pairs.values())
-
-
-def motion_model() -> str:
-    """The file of EKF-SLAM's pair in which the vehicle's motion stands."""
-    files = dict(bless.pairs())["slam:ekf_predict"]
-    candidates = [name for name in ("filters/ekf_step.py", "filters/vehicle.py") if name in files]
-    return next(n for n in candidates if "np.cos(" in (ROOT / "vslam_ref" / n).read_text(encoding="utf-8"))
 
 
 def test_a_changed_sign_is_seen(tmp_path: Path) -> None:
     """What runs is the changed NumPy function, with one warning; who demands Numba is refused."""
-    folder, name = copy_of(tmp_path), motion_model()
-    path = folder / "vslam_ref" / name
-    path.write_text(path.read_text(encoding="utf-8").replace("np.cos(", "-np.cos("), encoding="utf-8")
+    folder, name = copy_of(tmp_path), "filters/vehicle.py"
+    edit(
+        folder / "vslam_ref" / name,
+        "c, s = np.cos(theta), np.sin(theta)",
+        "c, s = -np.cos(theta), np.sin(theta)",
+    )
     found = probe(folder, "auto")
     assert np.abs(found["x"] - DRIVEN * [-1, 1, 1]).max() < 1e-8
     assert len(found["said"]) == 1
     assert name in found["said"][0]
     assert "make twins" in found["said"][0]
-    assert "slam:ekf_predict" in found["aside"]  # what a result's provenance says
+    assert "slam:ekf_predict_in_place" in found["aside"]  # what a result's provenance says
     assert "grids:apply_plain" not in found["aside"]
     assert not found["numba"]
     refused = probe(folder, "numba")
