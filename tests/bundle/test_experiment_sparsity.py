@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from vslam_ref.experiments import bundle_sparsity
-from vslam_ref.experiments.bundle import elimination, sparsity
-from vslam_ref.experiments.bundle_sparsity import Study
-from vslam_ref.experiments.framework import InputError, Result, RunContext, load
+from vslam_ref.experiments.bundle import counts, elimination, sparsity
+from vslam_ref.experiments.framework import Study, load
+from vslam_ref.support.errors import InputError
+
+Runs = Study[counts.Walk]
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result() -> Runs:
     experiment = load("bundle-sparsity")
-    return experiment.run(experiment.configure(quick=True), RunContext())
+    return experiment.run(experiment.configure(quick=True))
 
 
 @pytest.fixture
@@ -23,11 +26,11 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VSLAM_REF_DATA", "")
 
 
-def verdicts(study: Study) -> dict[str, str]:
-    return {c.id: c.verdict for c in bundle_sparsity.claims(Result({}, payload=study))}
+def verdicts(study: Runs) -> dict[str, str]:
+    return {c.id: c.verdict for c in sparsity.claims(study)}
 
 
-def lost(study: Study) -> set[str]:
+def lost(study: Runs) -> set[str]:
     return {id for id, v in verdicts(study).items() if v != "reproduced"}
 
 
@@ -40,51 +43,58 @@ IDS = {
 }
 
 
-def test_the_claims_hold(result: Result) -> None:
-    assert set(verdicts(result.payload)) == IDS
-    assert not lost(result.payload)
-    assert bundle_sparsity.figure(result).axes
+def test_the_claims_hold(result: Runs) -> None:
+    assert set(verdicts(result)) == IDS
+    assert not lost(result)
+    assert sparsity.figure(result).axes
 
 
 @pytest.mark.usefixtures("simulated")
 def test_the_claims_hold_of_a_simulation() -> None:
     experiment = load("bundle-sparsity")
-    found = experiment.run(experiment.configure(quick=True), RunContext())
-    assert not found.payload.arrow.real
-    assert not lost(found.payload)
+    found = experiment.run(experiment.configure(quick=True))
+    assert not found.once.arrow.real
+    assert not lost(found)
 
 
-def test_each_claim_fails_where_it_is_false(result: Result) -> None:
-    study: Study = result.payload
-    d, V = study.arrow.d, len(study.arrow.sees)
-    view, point = np.argwhere(study.arrow.sees)[0]
-    unseen = np.argwhere(~study.arrow.sees)[0]
+def test_each_claim_fails_where_it_is_false(result: Runs) -> None:
+    study, drawn = result, result.once
+    d, V = drawn.arrow.d, len(drawn.arrow.sees)
+    view, point = np.argwhere(drawn.arrow.sees)[0]
+    unseen = np.argwhere(~drawn.arrow.sees)[0]
     tip = d * V
     for row, column in ((0, d), (tip, tip + 3), (d * unseen[0], tip + 3 * unseen[1])):
-        H = study.arrow.H.copy()
+        H = drawn.arrow.H.copy()
         H[row, column] = H[column, row] = 1e-9  # two views, two points, a view that does not see the point
-        assert lost(study._replace(arrow=study.arrow._replace(H=H))) == {"the-matrix-is-an-arrow"}
-    H = study.arrow.H.copy()
+        assert lost(dataclasses.replace(study, once=drawn._replace(arrow=drawn.arrow._replace(H=H)))) == {
+            "the-matrix-is-an-arrow"
+        }
+    H = drawn.arrow.H.copy()
     H[d * view : d * view + d, tip + 3 * point : tip + 3 * point + 3] = (
         0.0  # an observation that tells nothing
     )
-    assert lost(study._replace(arrow=study.arrow._replace(H=H))) == {"the-matrix-is-an-arrow"}
+    assert lost(dataclasses.replace(study, once=drawn._replace(arrow=drawn.arrow._replace(H=H)))) == {
+        "the-matrix-is-an-arrow"
+    }
+    walks = sparsity.walks(study)
     for change, id in (
         ({"missing": 1}, "two-views-meet-where-they-share-a-point"),
         ({"extra": 1}, "two-views-meet-where-they-share-a-point"),
         ({"difference": 1e-6}, "order-makes-the-band"),
-        ({"shuffled": 2 * study.walks[-1].banded}, "order-makes-the-band"),
-        ({"points": 8 * study.walks[-2].points}, "a-walk-costs-what-it-is-long"),
-        ({"dense": 4 * study.walks[-2].dense}, "a-walk-costs-what-it-is-long"),
+        ({"shuffled": 2 * walks.banded[-1]}, "order-makes-the-band"),
+        ({"points": 8 * walks.points[-2]}, "a-walk-costs-what-it-is-long"),
+        ({"dense": 4 * walks.dense[-2]}, "a-walk-costs-what-it-is-long"),
     ):
-        walks = (*study.walks[:-1], study.walks[-1]._replace(**change))
-        assert lost(study._replace(walks=walks)) == {id}
+        [(name, value)] = change.items()
+        column = getattr(study.data, name).copy()
+        column[-1] = value  # of the longest walk
+        assert lost(dataclasses.replace(study, data=study.data._replace(**{name: column}))) == {id}
     for change in (
-        {"points_first": 1.001 * study.counts.predicted},
-        {"views_first": 2 * study.counts.predicted},
+        {"points_first": 1.001 * drawn.counts.predicted},
+        {"views_first": 2 * drawn.counts.predicted},
     ):
-        counts = study.counts._replace(**change)
-        assert lost(study._replace(counts=counts)) == {"points-first"}
+        other = drawn._replace(counts=drawn.counts._replace(**change))
+        assert lost(dataclasses.replace(study, once=other)) == {"points-first"}
 
 
 def test_counts_of_closed_forms() -> None:
@@ -110,8 +120,8 @@ def test_counts_of_closed_forms() -> None:
 
 
 def test_differences_agree_with_the_derivatives() -> None:
-    config = sparsity.SparsityConfig(views=(10, 11, 12), points_per_view=4)
-    problem = sparsity.walk(10, config)
+    config = counts.SparsityConfig(views=(10, 11, 12), points_per_view=4)
+    problem = counts.walk(config, 10)
     J = elimination.analytic(problem).toarray()
     # central differences, steps of 1e-6 on 500 px: h^2 from the series, eps * 500 / h from rounding
     np.testing.assert_allclose(elimination.differenced(problem), J, atol=1e-5 * np.abs(J).max())
@@ -120,8 +130,8 @@ def test_differences_agree_with_the_derivatives() -> None:
 
 
 def test_the_walk_has_lost_its_order() -> None:
-    config = sparsity.SparsityConfig()
-    T = sparsity.walk(30, config).scene.T_cam_world
+    config = counts.SparsityConfig()
+    T = counts.walk(config, 30).scene.T_cam_world
     step = np.abs(np.diff(T[:, 0, 3]))
     assert np.median(step) > 2.0  # neighbours in the file are not neighbours on the way
     np.testing.assert_allclose(np.sort(-T[:, 0, 3]), 0.5 * np.arange(30))

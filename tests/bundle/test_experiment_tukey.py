@@ -7,26 +7,28 @@ import dataclasses
 import numpy as np
 import pytest
 
-from vslam_ref.experiments import bundle_tukey
-from vslam_ref.experiments.bundle import wrong
-from vslam_ref.experiments.bundle.scene import (
+from vslam_ref.experiments.bundle import tukey, wrong
+from vslam_ref.experiments.bundle.tukey import at, limit
+from vslam_ref.experiments.bundle.wrong import METHODS, WrongRun
+from vslam_ref.experiments.framework import Study, load
+from vslam_ref.support.errors import InputError
+from vslam_ref.worlds.bundles import (
     make_bundle,
     moved_start,
     moved_world,
     nearest_of_family,
     scene_error,
 )
-from vslam_ref.experiments.bundle_tukey import METHODS, Study
-from vslam_ref.experiments.framework import InputError, Result, RunContext, load
 
 RUNS = 60
+Runs = Study[WrongRun]
 
 
-def verdicts(study: Study) -> dict[str, str]:
-    return {c.id: c.verdict for c in bundle_tukey.claims(Result({}, payload=study))}
+def verdicts(study: Runs) -> dict[str, str]:
+    return {c.id: c.verdict for c in tukey.claims(study)}
 
 
-def world(**factors: float) -> Study:
+def world(**factors: float) -> Runs:
     """Errors as the theory has them: 1 for least squares on honest data, each row with its own growth."""
     config = wrong.WrongConfig(runs=RUNS)
     shares = np.array(config.shares)
@@ -44,7 +46,7 @@ def world(**factors: float) -> Study:
     far = centre[:, :, config.shares.index(0.2)].copy()
     far[:, METHODS.index("tukey")] = 20.0
     one = np.ones_like(centre)
-    return Study(config, centre, one, one, one, one > 0, far)
+    return Study(config, WrongRun(centre, one, one, one, one > 0, far))
 
 
 IDS = {
@@ -60,65 +62,69 @@ IDS = {
 
 def test_the_claims_hold_in_a_world_where_they_are_true() -> None:
     assert verdicts(world()) == dict.fromkeys(IDS, "reproduced")
-    assert bundle_tukey.figure(Result({}, payload=world())).axes
+    assert tukey.figure(world()).axes
 
 
-def lost(study: Study) -> set[str]:
+def replaced(study: Runs, **fields: np.ndarray) -> Runs:
+    return dataclasses.replace(study, data=study.data._replace(**fields))
+
+
+def lost(study: Runs) -> set[str]:
     return {id for id, v in verdicts(study).items() if v == "not reproduced"}
 
 
-def changed(study: Study, method: str, share: float, value: np.ndarray | float) -> Study:
-    centre = study.centre.copy()
+def changed(study: Runs, method: str, share: float, value: np.ndarray | float) -> Runs:
+    centre = study.data.centre.copy()
     centre[:, METHODS.index(method), study.config.shares.index(share)] = value
-    return study._replace(centre=centre)
+    return replaced(study, centre=centre)
 
 
 def test_each_claim_fails_where_it_is_false() -> None:
     true = world()
-    good = true.at("tukey", 0.05)
+    good = at(true, "tukey", 0.05)
     assert lost(changed(true, "l2", 0.05, good)) == {"least-squares-breaks-at-once"}
-    tenth = np.where(np.arange(RUNS) < 6, 50.0, true.at("tukey", 0.4))  # a tenth of the scenes is too much
+    tenth = np.where(np.arange(RUNS) < 6, 50.0, at(true, "tukey", 0.4))  # a tenth of the scenes is too much
     assert lost(changed(true, "tukey", 0.4, tenth)) == {"tukey-holds-with-forty-percent-wrong"}
-    assert lost(changed(true, "huber", 0.2, true.at("adaptive", 0.2))) == {"huber-is-pulled"}
-    assert lost(changed(true, "tukey", 0.0, 1.2 * true.at("l2", 0.0))) == {"tukey-costs-little"}
+    assert lost(changed(true, "huber", 0.2, at(true, "adaptive", 0.2))) == {"huber-is-pulled"}
+    assert lost(changed(true, "tukey", 0.0, 1.2 * at(true, "l2", 0.0))) == {"tukey-costs-little"}
     for share in (0.0, 0.4):
-        same = changed(true, "ptam", share, true.at("adaptive", share))
+        same = changed(true, "ptam", share, at(true, "adaptive", share))
         assert lost(same) == {"scalar-constants-are-too-wide"}
     assert lost(changed(true, "adaptive", 0.6, 1.0)) == {"a-median-breaks-at-one-half"}
     for column, value in (("tukey", 1.0), ("adaptive", 20.0)):
-        far = true.far_centre.copy()
+        far = true.data.far_centre.copy()
         far[:, METHODS.index(column)] = value
-        assert lost(true._replace(far_centre=far)) == {"a-found-scale-comes-home-from-afar"}
+        assert lost(replaced(true, far_centre=far)) == {"a-found-scale-comes-home-from-afar"}
 
 
 def test_breakdown_is_the_first_share_that_breaks_more_than_half() -> None:
-    found = world().breakdown()
+    found = tukey.breakdown(world())
     assert found["l2"] == 0.05  # sqrt(1 + 500 * 0.05) = 5.1 > 3
     assert found["adaptive"] == 0.5
     assert found["tukey"] is None
 
 
 @pytest.fixture(scope="module")
-def quick() -> Result:
+def quick() -> Runs:
     experiment = load("bundle-tukey")
-    return experiment.run(experiment.configure(quick=True, runs=3), RunContext())
+    return experiment.run(experiment.configure(quick=True, runs=3))
 
 
-def test_a_quick_run_shows_the_large_effects(quick: Result) -> None:
+def test_a_quick_run_shows_the_large_effects(quick: Runs) -> None:
     """Three scenes: what differs by a factor of three and more."""
-    study: Study = quick.payload
-    assert (study.at("l2", 0.4) > 3 * study.at("adaptive", 0.4)).all()
-    assert (study.at("adaptive", 0.4) < study.limit).all()
-    assert (study.far_centre[:, METHODS.index("tukey")] > study.limit).all()
+    study = quick
+    assert (at(study, "l2", 0.4) > 3 * at(study, "adaptive", 0.4)).all()
+    assert (at(study, "adaptive", 0.4) < limit(study)).all()
+    assert (study.data.far_centre[:, METHODS.index("tukey")] > limit(study)).all()
     assert verdicts(study)["a-median-breaks-at-one-half"] == "not testable"
-    assert {c.id for c in bundle_tukey.claims(quick)} == IDS
+    assert {c.id for c in tukey.claims(quick)} == IDS
 
 
-def test_the_same_seed_gives_the_same_run(quick: Result) -> None:
-    config = quick.payload.config
+def test_the_same_seed_gives_the_same_run(quick: Runs) -> None:
+    config = quick.config
     seeds = np.random.SeedSequence(config.seed).spawn(config.runs)
-    alone = wrong.adjust_wrong(wrong.WrongTask(config, seeds[2]))
-    np.testing.assert_array_equal(alone.centre, quick.arrays["centre"][2])
+    alone = wrong.simulate(config, None, seeds[2])
+    np.testing.assert_array_equal(alone.centre, quick.data.centre[2])
 
 
 def test_wrong_observations_are_as_many_and_as_wrong_as_said() -> None:

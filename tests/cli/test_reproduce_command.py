@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from vslam_ref import cli
-from vslam_ref.experiments.framework import Claim, register, registry, scheduler, unregister
+from vslam_ref import _kernels, cli
+from vslam_ref.experiments import registry
+from vslam_ref.experiments.framework import Claim, register, scheduler, unregister
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -30,10 +31,10 @@ def failing(toy):
 def never(toy, monkeypatch):
     """Makes any run of the toy an error: bad input must be found before."""
 
-    def run(config, context):
+    def simulate(config, point, seeds):
         raise AssertionError("work began")
 
-    monkeypatch.setitem(registry._registered, "toy", replace(toy, run=run))
+    monkeypatch.setitem(registry._registered, "toy", replace(toy, simulate=simulate))
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,10 @@ def test_a_cluster_that_cannot_be_reached_is_told_before_any_work(never, tmp_pat
 def test_it_prints_a_line_per_claim_the_failed_ones_first_and_where_the_files_are(tmp_path, capsys):
     assert reproduce("toy", "--out", str(tmp_path), "--jobs", "1", "--set", "scale=9") == 0
     shown = capsys.readouterr()
-    failed, untested, files, summary = shown.out.strip().split("\n")
+    first, failed, found, untested, nothing, files, summary = shown.out.strip().split("\n")
+    assert first == f"backend {_kernels.backend()}"
+    assert found.strip() == "The mean is 8.97, and 1 is meant: not reproduced."
+    assert nothing.strip() == "Nothing was asked: not testable."
     assert failed.split(maxsplit=4) == [
         "not", "reproduced", "toy/near-1", "share", "1.000  the mean is near 1"
     ]  # fmt: skip
@@ -111,6 +115,20 @@ def test_json_holds_what_was_printed(tmp_path):
     assert (experiment["seed"], experiment["runs"]) == (5, 2)
     for key in ("experiment", "seed", "runs", "seconds", "claims"):
         assert experiment[key] == result[key]
+
+
+def test_a_quick_run_says_so_and_marks_small_samples(tmp_path, capsys):
+    target = tmp_path / "numbers.json"
+    arguments = ["toy", "--out", str(tmp_path / "out"), "--jobs", "1", "--quick", "--json", str(target)]
+    assert reproduce(*arguments) == 0
+    lines = capsys.readouterr().out.split("\n")
+    assert "quick run" in lines[0]
+    assert "small sample: 2 runs, the rule asks for 5" in [line.strip() for line in lines]
+    assert json.loads(target.read_text())["experiments"][0]["quick"] is True
+    assert reproduce(*arguments[:-3]) == 0
+    shown = capsys.readouterr().out
+    assert "quick run" not in shown
+    assert "small sample" not in shown
 
 
 def test_verdicts_change_the_status_only_with_strict(failing, tmp_path):
@@ -171,5 +189,6 @@ def test_a_run_that_breaks_is_not_hidden_and_leaves_no_json(toy, tmp_path, monke
     monkeypatch.setitem(registry._registered, "toy", replace(toy, claims=fail))
     with pytest.raises(RuntimeError, match="a bug"):
         reproduce("toy", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "x.json"), "--jobs", "1")
-    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+    shown = [p.name for p in tmp_path.iterdir() if not p.name.startswith(".")]  # finished batches stay
+    assert shown == ["out"]
     assert list((tmp_path / "out").iterdir()) == []

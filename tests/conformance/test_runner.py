@@ -12,7 +12,7 @@ import pytest
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.compare import compare, numbers
 from vslam_ref.conformance.program import InProcess
-from vslam_ref.conformance.report import page
+from vslam_ref.conformance.report import verification_page
 from vslam_ref.conformance.runner import Report, run
 
 LOOSE = {
@@ -215,7 +215,7 @@ def test_at_most_twenty_of_a_regime_count() -> None:
 
 def test_the_page_holds_causes_and_failures_and_escapes() -> None:
     report = one(np.eye(3).tolist())._replace(program="<b>mine</b>")
-    text = page(report)
+    text = verification_page(report)
     assert "&lt;b&gt;mine" in text
     assert "you forget the angle" in text
     assert "so3.exp/generic-01" in text

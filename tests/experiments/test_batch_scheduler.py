@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import socket
 import sys
+import time
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from toy_experiment import TOY, ToyConfig, run, worker_threads
+from toy_experiment import TOY, ToyConfig, worker_threads
 
 from vslam_ref import _kernels
-from vslam_ref.experiments.framework import InputError, RunContext, run_batches, scheduler
+from vslam_ref.experiments.framework import RunContext, progress, run_batches, scheduler
+from vslam_ref.support.errors import InputError
 from vslam_ref.support.json_text import to_json
 
 
@@ -33,8 +36,8 @@ def cluster() -> Iterator[str]:
 
 
 def written(context: RunContext) -> tuple[str, bytes]:
-    result = run(ToyConfig(), context)
-    return to_json(result.series), result.arrays["nees/ekf/low"].tobytes()
+    study = TOY.run(ToyConfig(), context)
+    return to_json(TOY.series(study)), study.data.nees.tobytes()
 
 
 def test_two_processes_give_the_bytes_of_one():
@@ -130,6 +133,7 @@ def test_missing_dask_names_the_extra_to_install(monkeypatch):
 def test_progress_is_silent_where_stderr_is_no_terminal(monkeypatch):
     stream = io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "_compiled", ["numba"])
     run_batches(str, range(3), progress=True, label="work")
     assert stream.getvalue() == ""
 
@@ -145,13 +149,32 @@ def test_progress_shows_on_a_terminal(monkeypatch):
     assert "work" in stream.getvalue()
 
 
-def test_experiments_of_one_command_share_a_study():
-    context, calls = RunContext(), []
+def test_without_a_terminal_a_line_now_and_then_says_how_many_runs_are_done(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    clock = iter(range(0, 1000, 9))  # nine seconds from look to look
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: float(next(clock)))
+    RunContext(progress=True).map(str, range(12), "work", sizes=[50] * 12, already=100)
+    first, *lines = stream.getvalue().strip().split("\n")
+    assert first == "work: 100 of 700 runs were done before"
+    assert all(re.fullmatch(r"work: \d+ of 700 runs, \d+ s", line) for line in lines)
+    seconds = [int(line.split()[-2]) for line in lines]
+    assert lines
+    assert min(np.diff([0, *seconds])) >= 20
 
-    def compute() -> int:
-        calls.append(1)
-        return 7
 
-    assert [context.shared(TOY.default(), compute), context.shared(TOY.default(), compute)] == [7, 7]
-    assert context.shared("another key", compute) == 7
-    assert len(calls) == 2
+@pytest.mark.parametrize(("takes", "lines"), [(0.0, 0), (0.5, 2)])
+def test_a_long_compilation_is_announced_and_timed(monkeypatch, takes, lines):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "WAIT", 0.2)
+    monkeypatch.setattr(progress, "_compiled", [])
+    monkeypatch.setattr(_kernels, "backend", lambda: "numba")
+    monkeypatch.setattr(_kernels, "warm", lambda *_: time.sleep(takes))
+    progress.compile_once()
+    progress.compile_once()  # once in a process
+    shown = stream.getvalue().strip().splitlines()
+    assert len(shown) == lines
+    if lines:
+        assert shown[0].startswith("preparing the Numba kernels: they are compiled once")
+        assert shown[1].startswith("kernels ready after")

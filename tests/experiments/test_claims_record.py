@@ -8,17 +8,36 @@ from typing import Any
 import pytest
 
 from vslam_ref.experiments.framework import Claim
-from vslam_ref.experiments.framework.claims import check_distinct
+from vslam_ref.experiments.framework.claims import check_distinct, judged, small_sample_note
 
 GOOD: dict[str, Any] = {
     "id": "a", "source": "B", "text": "t", "rule": "r", "measured": {"x": 1.0}, "ci": [0.0, 1.0],
-    "null_rate": 0.05, "share": 0.5, "verdict": "reproduced",
+    "null_rate": 0.05, "share": 0.5, "verdict": "reproduced", "sentence": "x is 1: reproduced.",
+    "runs": 4, "least_runs": 5, "quick": True,
 }  # fmt: skip
 
 
 def test_keys_are_those_of_the_result_file_in_order():
-    assert list(Claim(**GOOD).to_dict()) == list(GOOD)
-    assert Claim(**GOOD).to_dict() == GOOD
+    expected = GOOD | {"small_sample": True}
+    assert list(Claim(**GOOD).to_dict()) == list(expected)
+    assert Claim(**GOOD).to_dict() == expected
+
+
+@pytest.mark.parametrize(
+    ("runs", "least", "small"), [(4, 5, True), (5, 5, False), (None, 5, False), (4, None, False)]
+)
+def test_a_sample_is_small_when_the_rule_asks_for_more_runs(runs, least, small):
+    claim = Claim(**GOOD | {"runs": runs, "least_runs": least})
+    assert claim.small_sample is small
+    assert bool(small_sample_note(claim.to_dict())) is small
+
+
+@pytest.mark.parametrize(
+    ("holds", "word"), [(True, "reproduced"), (False, "not reproduced"), (None, "not testable")]
+)
+def test_the_sentence_ends_with_the_verdict_of_the_rule(holds, word):
+    claim = judged("a", "B", "t", "r", holds, "x is 1", {"x": 1.0})
+    assert (claim.verdict, claim.sentence) == (word, f"x is 1: {word}.")
 
 
 @pytest.mark.parametrize(

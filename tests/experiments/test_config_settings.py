@@ -10,8 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_experiment import Box, ToyConfig
 
-from vslam_ref.experiments.framework import InputError, apply_overrides, assumptions, config_to_dict
-from vslam_ref.support.config import format_value, parse_value, settings, without_reason
+from vslam_ref.support.config import (
+    apply_overrides,
+    assumptions,
+    config_to_dict,
+    find_setting,
+    format_value,
+    parse_value,
+    settings,
+    without_reason,
+)
+from vslam_ref.support.errors import InputError
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -123,3 +132,10 @@ def test_a_setting_without_a_reason_is_found():
     bare = make_dataclass("Bare", [("x", float, 1.0)], frozen=True)
     assert without_reason(bare()) == ["x"]
     assert without_reason(ToyConfig()) == []
+
+
+def test_of_two_settings_of_one_name_the_outer_one_is_found():
+    inner = make_dataclass("Inner", [("runs", int, 1)], frozen=True)
+    outer = make_dataclass("Outer", [("study", inner, inner()), ("runs", int, 2)], frozen=True)
+    assert find_setting(outer(), "runs") == "runs"
+    assert find_setting(outer(), "nothing") is None

@@ -12,6 +12,7 @@ from toy_experiment import TOY
 
 from vslam_ref.experiments.framework import RunContext, report
 from vslam_ref.experiments.framework.reproduce import reproduce
+from vslam_ref.support import pages
 
 VOID = {"meta", "link", "br", "img"}
 
@@ -62,15 +63,18 @@ def test_texts_of_experiments_are_shown_as_text(out):
 
 def test_no_text_of_a_result_file_becomes_markup():
     evil = '"><u>&'
-    claim = dict.fromkeys(("id", "source", "text", "rule", "ci", "null_rate", "share", "verdict"), evil)
+    keys = ("id", "source", "text", "rule", "ci", "null_rate", "share", "verdict", "sentence", "runs")
+    claim = dict.fromkeys((*keys, "least_runs", "small_sample"), evil)
     setting = dict.fromkeys(("key", "value", "default", "unit", "reason"), evil)
     result = {
         **dict.fromkeys(("folder", "title", "source", "seed", "runs", "seconds"), evil),
         "claims": [{**claim, "measured": {evil: evil}}],
         "assumptions": [setting, {**setting, "default": "another"}],
         "versions": {evil: evil},
+        "arrays": {evil: evil},
+        "quick": evil,
     }
-    for text in (report.page([result]), report.page([{"folder": evil, "error": evil, "claims": []}])):
+    for text in (report.index([result]), report.index([{"folder": evil, "error": evil, "claims": []}])):
         assert "<u>" not in text
         assert evil in Page(text).text
 
@@ -88,6 +92,16 @@ def test_failed_claims_come_first(out):
     assert text.index("✗ not reproduced", text.index("Claims, failed")) < text.index(
         "– not testable", text.index("Claims, failed")
     )
+
+
+def test_the_sentence_stands_open_and_raw_values_are_folded_under_it(out):
+    html = (out / "index.html").read_text(encoding="utf-8")
+    sentence = "The mean is 8.97, and 1 is meant: not reproduced."
+    assert sentence in html
+    after = html[html.index(sentence) + len(sentence) :]
+    assert after.startswith("<details><summary>rule and raw values</summary>")
+    folded = after[: after.index("</details>")]
+    assert all(word in folded for word in ("|mean - 1|", "<td>mean</td>", "<td>null_rate</td>"))
 
 
 def test_a_changed_assumption_shows_its_default(out):
@@ -115,7 +129,7 @@ def test_an_empty_folder_gives_a_page(tmp_path):
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_colours_are_readable(scheme):
     """WCAG AA: contrast 4.5 or more between text and paper."""
-    blocks = re.findall(r":root \{(.*?)\}", report._STYLE, re.DOTALL)
+    blocks = re.findall(r":root \{(.*?)\}", pages.STYLE, re.DOTALL)
     block = blocks[0 if scheme == "light" else 1]
     colours = dict(re.findall(r"--(\w+): (#[0-9a-f]+)", block))
 

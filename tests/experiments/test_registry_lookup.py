@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from toy_experiment import TOY
 
-from vslam_ref.experiments.framework import InputError, load, register, registry, summaries
+from vslam_ref.experiments import registry
+from vslam_ref.experiments.registry import load, register, summaries
 from vslam_ref.support.config import config_to_dict, find_setting, format_value, without_reason
+from vslam_ref.support.errors import InputError
 from vslam_ref.support.json_text import to_json
 
 IDS = [summary.id for summary in summaries()]
@@ -30,31 +33,44 @@ def test_an_unknown_id_names_the_nearest(toy):
 
 def test_listing_imports_no_numbers_and_no_plots():
     code = (
-        "import sys; from vslam_ref.experiments.framework.registry import summaries; summaries();"
+        "import sys; from vslam_ref.experiments.registry import summaries; summaries();"
         "print([m for m in ('numpy', 'scipy', 'matplotlib', 'numba') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
-def test_a_module_is_read_without_being_imported(tmp_path):
-    module = tmp_path / "my_table.py"
+@pytest.fixture
+def module(tmp_path):
+    """A module of a family called ``my``."""
+    (tmp_path / "my").mkdir()
+    return tmp_path / "my" / "table.py"
+
+
+def test_a_module_is_read_without_being_imported(module):
     module.write_text(
-        'raise SystemExit\nEXPERIMENT = Experiment(id="my-table", title="T", source="S", run=f)\n'
+        'raise SystemExit\nEXPERIMENT = Experiment(id="my-table", title="T", source="S", simulate=f)\n'
     )
-    assert registry._read(module) == ("my-table", "T", "S")
-    (tmp_path / "helper.py").write_text("x = 1\n")
-    assert registry._read(tmp_path / "helper.py") is None
+    assert registry.read(module) == [("my-table", "T", "S")]
+    module.write_text("x = 1\n")
+    assert registry.read(module) == []
 
 
-def test_a_record_that_cannot_be_read_says_what_it_needs(tmp_path):
-    module = tmp_path / "my_table.py"
+def test_rows_of_a_table_are_experiments_of_their_own(module):
+    module.write_text(
+        'EXPERIMENTS = (\n    row(2, id="my-fig2", title="T2", source="S"),\n'
+        '    row(3, id="my-fig3", title="T3", source="S"),\n)\n'
+    )
+    assert registry.read(module) == [("my-fig2", "T2", "S"), ("my-fig3", "T3", "S")]
+
+
+def test_a_record_that_cannot_be_read_says_what_it_needs(module):
     module.write_text('EXPERIMENT = Experiment(id="my-table", title=TITLE, source="S")\n')
     with pytest.raises(ValueError, match="must give title as literal"):
-        registry._read(module)
-    module.write_text('EXPERIMENT = Experiment(id="other", title="T", source="S")\n')
-    with pytest.raises(ValueError, match="belongs in another file"):
-        registry._read(module)
+        registry.read(module)
+    module.write_text('EXPERIMENT = Experiment(id="other-table", title="T", source="S")\n')
+    with pytest.raises(ValueError, match="belongs in another folder"):
+        registry.read(module)
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -68,7 +84,7 @@ def test_the_record_that_was_read_is_the_record_that_runs(id):
 def test_every_setting_of_every_experiment_gives_its_reason(id):
     experiment = load(id)
     assert without_reason(experiment.default()) == []
-    assert without_reason(experiment.quick(experiment.default())) == []
+    assert without_reason(experiment.configure(quick=True)) == []
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -105,3 +121,10 @@ def test_a_population_keeps_its_ratio_to_the_sample():
 def test_errors_of_settings_name_the_experiment():
     with pytest.raises(InputError, match=r"^toy: unknown setting 'x'"):
         TOY.configure(overrides=["x=1"])
+
+
+def test_bench_and_experiments_do_not_import_each_other():
+    package = Path(registry.__file__).parents[1]
+    for room, other in (("bench", "experiments"), ("experiments", "bench")):
+        for path in (package / room).rglob("*.py"):
+            assert f"vslam_ref.{other}" not in path.read_text(encoding="utf-8"), path

@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from toy_experiment import TOY, figure
+from toy_experiment import TOY, Rows, figure
 
-from vslam_ref.experiments.framework import Claim, InputError, RunContext
+from vslam_ref.experiments.framework import Claim, RunContext
 from vslam_ref.experiments.framework.reproduce import reproduce
 from vslam_ref.experiments.framework.writer import FILES, write_npz
 from vslam_ref.support import files
+from vslam_ref.support.errors import InputError
 from vslam_ref.support.json_text import plain, to_json
 
 scalars = (
@@ -78,6 +79,11 @@ def test_the_folder_holds_the_four_files_and_the_index_shows_them(tmp_path):
     assert content["config"]["box.side"] == 3.0
     assert content["series"]["nees"]["nothing"] == [None]
     assert [c["verdict"] for c in content["claims"]] == ["not testable", "reproduced"]
+    assert [c["sentence"] for c in content["claims"]] == [
+        "Nothing was asked: not testable.", "The mean is 1.00, and 1 is meant: reproduced.",
+    ]  # fmt: skip
+    assert content["quick"] is content["claims"][1]["quick"] is content["claims"][1]["small_sample"] is False
+    assert content["arrays"] == {"nees/ekf/low": "numbers near 1; (runs, times); shape (24, 5)"}
     assert content["seconds"] > 0
     assert content["versions"]["backend"] in ("numpy", "numba")
     assert {"vslam_ref", "git_commit", "python", "numpy", "scipy", "numba", "platform"} <= set(
@@ -87,6 +93,33 @@ def test_the_folder_holds_the_four_files_and_the_index_shows_them(tmp_path):
         nees = arrays["nees/ekf/low"]
     assert nees.shape == (24, 5)
     assert content["series"]["nees"]["ekf/low"] == nees.mean(0).tolist()
+
+
+def test_a_quick_run_says_so_and_marks_verdicts_on_small_samples(tmp_path):
+    [outcome] = reproduce([(TOY, TOY.configure(quick=True))], RunContext(), tmp_path, quick=True)
+    content = json.loads((outcome.folder / "result.json").read_text())
+    assert content["quick"] is True
+    always, near = content["claims"]
+    assert [near[k] for k in ("quick", "small_sample", "runs", "least_runs")] == [True, True, 2, 5]
+    assert [always[k] for k in ("quick", "small_sample")] == [True, False]
+    page = (tmp_path / "index.html").read_text()
+    assert "Quick run" in page
+    assert "small sample: 2 runs, the rule asks for 5" in page
+
+
+def test_experiments_that_simulate_the_same_share_their_runs(tmp_path, monkeypatch):
+    log = tmp_path / "log"
+    monkeypatch.setenv("TOY_LOG", str(log))
+    twin = replace(TOY, id="toy-twin")
+    config = TOY.configure()
+    work = [(TOY, config), (twin, config), (TOY, TOY.configure(seed=9))]
+    list(reproduce(work, RunContext(), tmp_path / "out"))
+    assert len(log.read_text().split()) == 2 * 6  # six batches, run for the first and for the third
+
+
+def test_an_array_that_nobody_describes_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="must say what these arrays are: nees/ekf/low"):
+        make(tmp_path, replace(TOY, about={}))
 
 
 def test_the_same_run_gives_the_same_bytes_whatever_the_clock_says(tmp_path, monkeypatch):
@@ -111,12 +144,12 @@ def test_arrays_of_objects_are_refused(tmp_path):
         write_npz(tmp_path / "x.npz", {"a": np.array([{}])})
 
 
-@pytest.mark.parametrize("part", ["run", "claims", "figure"])
+@pytest.mark.parametrize("part", ["simulate", "claims", "figure"])
 def test_a_run_that_fails_leaves_the_previous_result_whole(tmp_path, part):
     folder = make(tmp_path)
     before = {name: (folder / name).read_bytes() for name in FILES}
 
-    def fail(*_):
+    def fail(*_) -> Rows:
         raise RuntimeError("no")
 
     with pytest.raises(RuntimeError, match="no"):
@@ -228,15 +261,14 @@ def test_an_output_folder_that_is_a_file_is_refused(tmp_path, inside):
 def test_claims_with_one_name_are_refused_before_anything_is_written(tmp_path):
     twice = Claim("a", "s", "t", "r", {}, None, None, None, "reproduced")
     with pytest.raises(ValueError, match="two claims"):
-        make(tmp_path, replace(TOY, claims=lambda result: [twice, twice]))
+        make(tmp_path, replace(TOY, claims=lambda study: [twice, twice]))
     assert names(tmp_path) == set()
 
 
 def test_figures_are_vectors_with_stable_ids(tmp_path):
     from vslam_ref.plot.saving import save_figure
 
-    result = TOY.run(TOY.default(), RunContext())
-    save_figure(figure(result), tmp_path, "toy")
+    save_figure(figure(TOY.run(TOY.default())), tmp_path, "toy")
     text = (tmp_path / "figure.svg").read_text()
     assert "<svg" in text
     assert "<dc:date>" not in text

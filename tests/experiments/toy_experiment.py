@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, register, verdict
+from vslam_ref.experiments.framework import Claim, Experiment, Study, batches, judged, register
 
 TIMES = 5
 
@@ -41,17 +41,27 @@ class ToyConfig:
             raise ValueError(f"scale {self.scale} must be positive")
 
 
-def simulate(batch: list[np.random.SeedSequence]) -> NDArray[np.float64]:
+class Rows(NamedTuple):
+    """One row of numbers per run."""
+
+    nees: NDArray[np.float64]
+
+
+def simulate(config: ToyConfig, point: None, seeds: tuple[np.random.SeedSequence, ...]) -> Rows:
     """One row of numbers per run; products big enough that threads could change their rounding."""
     rows = []
     if "TOY_HANG" in os.environ:  # for the test of Ctrl-C
         Path(os.environ["TOY_HANG"]).touch()
         time.sleep(120)
-    for seed in batch:
+    if "TOY_LOG" in os.environ:  # for the test of a run that is killed and started again
+        with open(os.environ["TOY_LOG"], "a") as log:
+            log.write(f"{seeds[0].spawn_key[0]}\n")
+        time.sleep(float(os.environ.get("TOY_SLEEP", "0")))
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         a, b = rng.standard_normal((2, 96, 96))
         rows.append(np.linalg.norm(a @ b, axis=1)[:TIMES] / 96.0)
-    return np.array(rows)
+    return Rows(config.scale * np.array(rows))
 
 
 def worker_threads(_: int) -> tuple[int, int, str]:
@@ -64,36 +74,30 @@ def worker_threads(_: int) -> tuple[int, int, str]:
     return os.getpid(), max((p["num_threads"] for p in threadpool_info()), default=1), _kernels.backend()
 
 
-def run(config: ToyConfig, context: RunContext) -> Result:
-    seeds = np.random.SeedSequence(config.seed).spawn(config.population)
-    batches = [seeds[i : i + config.batch] for i in range(0, len(seeds), config.batch)]
-    nees = config.scale * np.concatenate(context.map(simulate, batches, "toy"))
-    return Result(
-        series={"time": np.arange(TIMES), "nees": {"ekf/low": nees.mean(0), "nothing": [float("nan")]}},
-        seed=config.seed,
-        runs=config.runs,
-        arrays={"nees/ekf/low": nees},
-        payload=config,
-    )
+def seeds(config: ToyConfig, point: None) -> list[tuple[np.random.SeedSequence, ...]]:
+    return batches(np.random.SeedSequence(config.seed).spawn(config.population), config.batch)
 
 
-def claims(result: Result) -> list[Claim]:
-    mean = float(np.mean(result.series["nees"]["ekf/low"]))
+def series(study: Study[Rows]) -> dict[str, object]:
+    nees = {"ekf/low": study.data.nees.mean(0), "nothing": [float("nan")]}
+    return {"time": np.arange(TIMES), "nees": nees}
+
+
+def claims(study: Study[Rows]) -> list[Claim]:
+    mean = float(np.mean(study.data.nees))
+    near = abs(mean - 1.0) < 0.05
     return [
-        Claim("always", "toy <1>", "one < two & so on", "none", {}, None, None, None, verdict(None)),
-        Claim("near-1", "toy 2", "the mean is near 1", "|mean - 1| < 0.05", {"mean": mean},
-              [mean - 0.1, mean + 0.1], 0.05, 1.0, verdict(abs(mean - 1.0) < 0.05)),
+        judged("always", "toy <1>", "one < two & so on", "none", None, "Nothing was asked", {}),
+        judged("near-1", "toy 2", "the mean is near 1", "|mean - 1| < 0.05", near,
+               f"The mean is {mean:.2f}, and 1 is meant", {"mean": mean}, ci=[mean - 0.1, mean + 0.1],
+               null_rate=0.05, share=1.0, least_runs=5),
     ]  # fmt: skip
 
 
-def figure(result: Result) -> Figure:
+def figure(study: Study[Rows]) -> Figure:
     drawn = Figure()
-    drawn.add_subplot().plot(result.series["time"], result.series["nees"]["ekf/low"])
+    drawn.add_subplot().plot(np.arange(TIMES), study.data.nees.mean(0))
     return drawn
-
-
-def quick(config: ToyConfig) -> ToyConfig:
-    return replace(config, population=8, runs=2)
 
 
 TOY = Experiment(
@@ -101,10 +105,14 @@ TOY = Experiment(
     title="A toy <script>alert(1)</script>",
     source="nobody's paper & none",
     config_type=ToyConfig,
-    run=run,
+    simulate=simulate,
+    seeds=seeds,
+    series=series,
+    arrays=lambda study: {"nees/ekf/low": study.data.nees},
     claims=claims,
     figure=figure,
-    quick=quick,
+    about={"nees": "numbers near 1; (runs, times)"},
+    quick={"population": 8, "runs": 2},
     defaults={"box.side": 3.0},
 )
 

@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vslam_ref.experiments import grids_moved_chair as chair
-from vslam_ref.experiments import grids_readings as readings
-from vslam_ref.experiments.framework import InputError, Result, RunContext, load
+from vslam_ref.experiments.framework import Study, load
+from vslam_ref.experiments.framework.statistics import null_rate
+from vslam_ref.experiments.grids import moved_chair as chair
+from vslam_ref.experiments.grids import readings
+from vslam_ref.experiments.grids.counting import Counts
 from vslam_ref.support.config import without_reason
+from vslam_ref.support.errors import InputError
 
 
 def judge(module: object, study: object) -> dict[str, str]:
-    claims = module.claims(Result({}, payload=study))  # type: ignore[attr-defined]
-    return {c.id: c.verdict for c in claims}
+    return {c.id: c.verdict for c in module.claims(study)}  # type: ignore[attr-defined]
 
 
 # -- readings --------------------------------------------------------------------------------------
 
 
-def reading_study(precision: list[float], recall: list[float], spread: float = 0.0) -> readings.Study:
+def reading_study(precision: list[float], recall: list[float], spread: float = 0.0) -> Study[Counts]:
     """Six runs whose D has these precisions and recalls, plus or minus a hundredth."""
     rng = np.random.default_rng(0)
     moving = np.zeros((6, 4, 4))
@@ -28,7 +30,7 @@ def reading_study(precision: list[float], recall: list[float], spread: float = 0
         moving[:, i] = np.stack([1e4 * (p + shift), np.full(6, 1e4), np.full(6, 1e4), 1e4 * (r + shift)], 1)
     static = np.tile(np.array([90.0, 100.0, 100.0, 95.0]), (6, 4, 1))
     static[3, 2, 1] += spread
-    return readings.Study(readings.ReadingsConfig(), static, moving)
+    return Study(readings.ReadingsConfig(), Counts(static, moving, np.zeros(6)))
 
 
 def test_readings_as_measured_and_as_a_says() -> None:
@@ -63,10 +65,10 @@ def test_a_reading_that_is_no_better_is_not_called_better() -> None:
         rng = np.random.default_rng(seed)
         moving = np.tile(np.array([800.0, 1000.0, 1000.0, 700.0]), (6, 4, 1))
         moving[..., [0, 3]] += rng.normal(0, 30, (6, 4, 2))
-        study = readings.Study(readings.ReadingsConfig(), np.zeros((6, 4, 4)), moving)
+        study = Study(readings.ReadingsConfig(), Counts(np.zeros((6, 4, 4)), moving, np.zeros(6)))
         said += judge(readings, study)["d-needs-no-memory"] == "reproduced"
     # the rate that the claim declares, plus and minus three sigma of 200 draws
-    rate = readings.null_rate(6)
+    rate = null_rate(6)
     assert rate == pytest.approx(0.067, abs=1e-3)
     assert abs(said - 200 * rate) <= 3 * np.sqrt(200 * rate * (1 - rate))
 
@@ -74,7 +76,7 @@ def test_a_reading_that_is_no_better_is_not_called_better() -> None:
 # -- chair -----------------------------------------------------------------------------------------
 
 
-def chair_study(**changes: np.ndarray) -> chair.Study:
+def chair_study(**changes: np.ndarray) -> Study[chair.Run]:
     """Four runs at five scans a second: the printed table never learns, the ageing one does at T."""
     config = chair.ChairConfig()
     since = 0.2 * np.arange(360) - config.put_down
@@ -90,7 +92,7 @@ def chair_study(**changes: np.ndarray) -> chair.Study:
     values["static"][:, :, since < 0] = np.nan
     values["dynamic"][:, :, since < 0] = np.nan
     values["static"][1, :, 100:130] = np.nan  # somebody stood before it
-    return chair.Study(config, since, **(values | changes))
+    return Study(config, chair.Run(**(values | changes)))
 
 
 CHAIR = {"dynamic-for-ever", "ageing-mends-it", "leaves-its-old-place", "ageing-takes-in-no-walkers"}
@@ -101,7 +103,7 @@ def test_the_chair_as_measured() -> None:
 
 
 def test_each_claim_of_the_chair_fails_where_it_is_false() -> None:
-    good = chair_study()
+    good = chair_study().data
     learns = chair_study(static=good.static[:, ::-1], dynamic=good.dynamic[:, ::-1])  # the wrong one learns
     assert judge(chair, learns)["dynamic-for-ever"] == "not reproduced"
     assert judge(chair, learns)["ageing-mends-it"] == "not reproduced"
@@ -141,9 +143,9 @@ def test_settings_that_mean_nothing_are_refused() -> None:
 def test_a_quick_run_says_the_same_twice_and_draws(id: str) -> None:
     experiment = load(id)
     config = experiment.configure(quick=True)
-    one, two = (experiment.run(config, RunContext()) for _ in range(2))
-    for name, values in one.arrays.items():
-        np.testing.assert_array_equal(values, two.arrays[name])
+    one, two = (experiment.run(config) for _ in range(2))
+    for a, b in zip(one.data, two.data, strict=True):
+        np.testing.assert_array_equal(a, b)
     verdicts = {c.id: c.verdict for c in experiment.claims(one)}
     assert verdicts.pop("high-where-undetermined", "not reproduced") == "not reproduced"
     assert set(verdicts.values()) == {"reproduced"}

@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from vslam_ref.experiments.iekf import SENTENCES, evaluate
-from vslam_ref.experiments.iekf.rules import MARKED, Scene
+from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.rules import MARKED
 from vslam_ref.metrics import consistency
 
 STUDIES = 600

@@ -15,7 +15,8 @@ from vslam_ref.experiments.iekf import (
     judge,
     rules_table,
 )
-from vslam_ref.experiments.iekf.rules import Rule, average, difference_factor, ratio
+from vslam_ref.experiments.iekf.measures import average, difference_factor, ratio
+from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.support.json_text import to_json
 
 

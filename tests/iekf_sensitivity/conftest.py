@@ -9,8 +9,8 @@ import pytest
 
 from vslam_ref.experiments.framework import Claim, Verdict, verdict
 from vslam_ref.experiments.iekf.grid import SensitivityConfig, Setting, settings_of
-from vslam_ref.experiments.iekf.sensitivity import Grid, Judged
 from vslam_ref.experiments.iekf.sentences import SENTENCES
+from vslam_ref.experiments.iekf.settings import Grid, Judged
 
 Share = Callable[[str, Setting], float | None]
 End = Callable[[str, Setting], float]

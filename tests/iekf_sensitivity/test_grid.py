@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.framework import config_to_dict, load
+from vslam_ref.experiments.framework import load
 from vslam_ref.experiments.iekf import study
 from vslam_ref.experiments.iekf.grid import (
     BASELINE,
@@ -16,10 +16,9 @@ from vslam_ref.experiments.iekf.grid import (
     SensitivityConfig,
     baseline_value,
     grid_with_runs,
-    quick_grid,
     settings_of,
 )
-from vslam_ref.support.config import without_reason
+from vslam_ref.support.config import config_to_dict, without_reason
 
 CONFIG = SensitivityConfig()
 SETTINGS = settings_of(CONFIG)
@@ -71,7 +70,7 @@ def test_a_layout_moves_landmarks_only_and_a_draw_moves_noises_only() -> None:
 
 
 def test_quick_and_runs_keep_the_grid_usable() -> None:
-    small = quick_grid(CONFIG)
+    small = load("iekf-sensitivity").configure(quick=True)
     assert 3 <= len(settings_of(small)) <= 6
     more = grid_with_runs(CONFIG, 100)
     assert (more.study.runs, more.study.population, more.study.control_runs) == (100, 400, 800)

@@ -9,8 +9,8 @@ import pytest
 
 from vslam_ref.experiments.iekf.grid import NUMERIC, SensitivityConfig, baseline_value
 from vslam_ref.experiments.iekf.grid_rules import along_axis, mechanism_claims, rises_along, statement_claim
-from vslam_ref.experiments.iekf.sensitivity import Grid
 from vslam_ref.experiments.iekf.sentences import SENTENCES
+from vslam_ref.experiments.iekf.settings import Grid
 
 AT = {axis: baseline_value(SensitivityConfig(), axis) for axis in NUMERIC}
 LAYOUT_CLAIM = "ekf-low-lap2-inconsistent"

@@ -6,11 +6,9 @@ from itertools import pairwise
 
 import pytest
 
-from vslam_ref.experiments import iekf_sensitivity
-from vslam_ref.experiments.framework import Result
-from vslam_ref.experiments.iekf.grid import SensitivityConfig
-from vslam_ref.experiments.iekf.sensitivity import map_series
+from vslam_ref.experiments.iekf import sensitivity
 from vslam_ref.experiments.iekf.sentences import SENTENCES
+from vslam_ref.experiments.iekf.settings import map_series
 from vslam_ref.plot.sensitivity import CELLS, cell_text, spans
 
 
@@ -35,7 +33,7 @@ def test_the_series_have_one_column_per_setting_and_one_row_per_statement(grid):
 
 
 def test_the_figure_shows_every_cell(grid):
-    figure = iekf_sensitivity.figure(Result({}, payload=(SensitivityConfig(), grid)))
+    figure = sensitivity.draw(grid)
     above, below = figure.axes
     texts = [t.get_text() for t in above.texts]
     rows, layouts, draws = len(SENTENCES), len(grid.axis("layout")), len(grid.axis("draw"))

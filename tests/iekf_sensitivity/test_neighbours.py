@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import RunContext, load
+from vslam_ref.experiments.iekf.circle import PUBLISHED, published_claim
 from vslam_ref.experiments.iekf.neighbours import (
     FILTERS,
     QUESTIONS,
@@ -16,7 +17,6 @@ from vslam_ref.experiments.iekf.neighbours import (
     last,
     rmse,
 )
-from vslam_ref.experiments.iekf_circle import PUBLISHED, published_claim
 from vslam_ref.support.json_text import to_json
 
 TRUE = {
@@ -95,24 +95,25 @@ def test_the_last_tenth_is_a_tenth():
 def test_quick_run_end_to_end(id):
     experiment = load(id)
     config = experiment.configure(quick=True)
-    result = experiment.run(config, RunContext())
-    assert set(result.series["nees"]) == {f"{name}/{start}" for name in FILTERS for start in STARTS}
-    assert all(len(c) == len(result.series["time"]) for c in result.series["rmse_position"].values())
-    claims = {c.id: c for c in experiment.claims(result)}
+    study = experiment.run(config)
+    series = experiment.series(study)
+    assert set(series["nees"]) == {f"{name}/{start}" for name in FILTERS for start in STARTS}
+    assert all(len(c) == len(series["time"]) for c in series["rmse_position"].values())
+    claims = {c.id: c for c in experiment.claims(study)}
     assert claims["zero-anchored-is-ekf"].verdict == "reproduced"
     assert {c.verdict for i, c in claims.items() if i != "zero-anchored-is-ekf"} == {"not testable"}
-    assert len(experiment.figure(result).axes) == 4
+    assert len(experiment.figure(study).axes) == 4
     # one worker or two, the same bytes
     again = experiment.run(config, RunContext(jobs=2))
-    assert to_json(again.series) == to_json(result.series)
+    assert to_json(experiment.series(again)) == to_json(series)
 
 
 def test_sensitivity_quick_run_end_to_end():
     experiment = load("iekf-sensitivity")
-    result = experiment.run(experiment.configure(quick=True), RunContext())
-    claims = experiment.claims(result)
+    study = experiment.run(experiment.configure(quick=True))
+    claims, series = experiment.claims(study), experiment.series(study)
     assert len(claims) == 6 + 28
     assert {c.verdict for c in claims} == {"not testable"}
-    assert result.series["axis"][0] == "baseline"
-    assert all(np.isfinite(row).all() for row in result.series["nees_end"].values())
-    assert len(experiment.figure(result).axes) == 2
+    assert series["axis"][0] == "baseline"
+    assert all(np.isfinite(row).all() for row in series["nees_end"].values())
+    assert len(experiment.figure(study).axes) == 2

@@ -9,7 +9,6 @@ import pytest
 
 from vslam_ref.experiments.framework import RunContext, load, summaries
 from vslam_ref.experiments.iekf import study
-from vslam_ref.experiments.iekf.figures import FIGURE_2, figure_result
 from vslam_ref.experiments.iekf.study import StudyConfig, StudyResult, run_study
 from vslam_ref.metrics.consistency import mean_band
 from vslam_ref.support.config import without_reason
@@ -22,7 +21,8 @@ SMALL = StudyConfig(
 
 
 def bytes_of(config: StudyConfig, context: RunContext) -> str:
-    return to_json(figure_result(config, context, FIGURE_2).series)
+    experiment = load("iekf-fig2")
+    return to_json(experiment.series(experiment.run(config, context)))
 
 
 def test_series_are_the_same_bytes_for_one_and_two_workers() -> None:
@@ -112,4 +112,4 @@ def test_meaningless_studies_are_refused(change: dict[str, object]) -> None:
 def test_every_setting_of_every_experiment_gives_its_reason(id: str) -> None:
     experiment = load(id)
     assert without_reason(experiment.default()) == []
-    assert experiment.quick(experiment.default()) is not None
+    assert experiment.configure(quick=True) != experiment.default()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.moving.localisation import localise
+from vslam_ref.experiments.grids.following import localise
 from vslam_ref.grids import Lattice, LogOddsGrid, MapConfig
 from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, Recording, simulate

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.moving.localisation import localise
-from vslam_ref.experiments.moving.readings import increment_of, scan_of
+from vslam_ref.experiments.grids.beams import increment_of, scan_of
+from vslam_ref.experiments.grids.following import localise
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids import LogOddsGrid, MapConfig, Scan
 from vslam_ref.grids.landmarks import LandmarkConfig, MatchConfig, distance_field

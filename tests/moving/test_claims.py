@@ -7,24 +7,23 @@ import dataclasses
 import numpy as np
 import pytest
 
-from vslam_ref.experiments import grids_landmarks, grids_localisation, grids_separation
-from vslam_ref.experiments.framework import InputError, Result, RunContext, load
-from vslam_ref.experiments.moving import choice, localisation, separation
-from vslam_ref.experiments.moving.readings import generator
+from vslam_ref.experiments.framework import Study, load
+from vslam_ref.experiments.framework.driver import Task, carry_out
+from vslam_ref.experiments.grids import choice, counting, following, landmarks, localisation, separation
 from vslam_ref.grids import MapConfig
 from vslam_ref.support.config import without_reason
+from vslam_ref.support.errors import InputError
 from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, simulate
 
 STUDIES = {
-    "grids-separation": grids_separation,
-    "grids-localisation": grids_localisation,
-    "grids-landmarks": grids_landmarks,
+    "grids-separation": separation,
+    "grids-localisation": localisation,
+    "grids-landmarks": landmarks,
 }
 
 
 def verdicts(module: object, study: object) -> dict[str, str]:
-    found = module.claims(Result({}, payload=study))  # type: ignore[attr-defined]
-    return {c.id: c.verdict for c in found}
+    return {c.id: c.verdict for c in module.claims(study)}  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("id", STUDIES)
@@ -34,9 +33,9 @@ def test_every_setting_has_a_reason(id: str) -> None:
 
 def separated(
     S: tuple[float, float], plain: tuple[float, float], D: tuple[float, float]
-) -> grids_separation.Study:
+) -> Study[counting.Counts]:
     """A study with these precisions and recalls at 20 %, give or take a thousandth between runs."""
-    config = separation.SeparationConfig(runs=6, densities=(0.0, 0.2))
+    config = counting.SeparationConfig(runs=6, densities=(0.0, 0.2))
     wobble = np.random.default_rng(1).uniform(-1, 1, (2, 6, 1))
 
     def count(p: float, r: float) -> np.ndarray:
@@ -45,68 +44,71 @@ def separated(
         return np.concatenate([1000 * p, 1000 * ones, 1000 * ones, 1000 * r], axis=-1)
 
     static = np.stack([count(*S), count(*plain)], axis=2)
-    return grids_separation.Study(config, static, count(*D), np.zeros((2, 6)))
+    return Study(config, counting.Counts(static, count(*D), np.zeros((2, 6))))
 
 
 def test_the_aims_of_the_separation() -> None:
     good = separated((0.99, 0.98), (0.9, 0.985), (0.9, 0.9))
-    assert set(verdicts(grids_separation, good).values()) == {"reproduced"}
+    assert set(verdicts(separation, good).values()) == {"reproduced"}
     bad = separated((0.96, 0.96), (0.97, 0.98), (0.84, 0.84))
-    assert set(verdicts(grids_separation, bad).values()) == {"not reproduced"}
+    assert set(verdicts(separation, bad).values()) == {"not reproduced"}
     only = separated((0.99, 0.96), (0.9, 0.99), (0.9, 0.84))
-    assert {k for k, v in verdicts(grids_separation, only).items() if v == "reproduced"} == {
+    assert {k for k, v in verdicts(separation, only).items() if v == "reproduced"} == {
         "static-precision", "moving-precision", "cleaner-than-a-plain-grid",
     }  # fmt: skip
 
 
 def localised(
     ratio: float, growth: float, fall: float, ideal: float = 0.9, squares: float = 10.0
-) -> grids_localisation.Study:
+) -> Study[following.Run]:
     """Errors of 0.1 m on an empty floor, times ``growth`` in the crowd; separated / plain is ``ratio``.
 
     The truth's beams give ``ideal`` of the plain error; least squares make all ``squares`` times as large.
     """
-    config = localisation.LocalisationConfig(runs=8, densities=(0.0, 0.4), errors=(0.0, 0.1))
+    config = following.LocalisationConfig(runs=8, densities=(0.0, 0.4), errors=(0.0, 0.1))
     wobble = np.exp(0.05 * np.random.default_rng(2).standard_normal((2, 8, 3)))
     rmse = 0.1 * wobble
     rmse[1] *= [growth * ratio, growth, growth * ideal]
     f = np.array([0.9, 0.9 - fall]) + 0.005 * np.random.default_rng(3).standard_normal((8, 2))
     spoiled = np.stack([1000 * f, np.full((8, 2), 1000.0), np.full((8, 2), 1000.0)], axis=-1)
     beams, people = np.ones((2, 8, 3)), np.zeros((2, 8))
-    return grids_localisation.Study(config, rmse, rmse, squares * rmse[1], beams, spoiled, people)
+    empty, all_spoiled = np.full_like(rmse, np.nan), np.zeros((3, 8, 2, 3))
+    all_spoiled[2] = spoiled  # 0.1 is none of the densities: a point of its own
+    runs = following.Run(rmse, rmse, np.stack([empty[0], squares * rmse[1]]), beams, all_spoiled, people)
+    third = following.Run(*(np.concatenate([a, a[:1]]) if len(a) == 2 else a for a in runs))
+    return Study(config, third)
 
 
 def test_the_claims_on_localisation() -> None:
     halves = ("halves-the-error", "halves-the-error-of-least-squares")
     bounds = ("no-mistakes-would-not-halve-it", "a-cut-does-more")
     names = (*halves, *bounds, "helps", "static-error-spoils-dynamic", "moving-things-spoil-static")
-    true = verdicts(grids_localisation, localised(0.4, 4.0, 0.2))
+    true = verdicts(localisation, localised(0.4, 4.0, 0.2))
     assert true == dict.fromkeys(names, "reproduced")
-    false = verdicts(grids_localisation, localised(1.0, 1.5, 0.02, ideal=0.45, squares=0.9))
+    false = verdicts(localisation, localised(1.0, 1.5, 0.02, ideal=0.45, squares=0.9))
     assert false == dict.fromkeys(names, "not reproduced")
-    some = verdicts(grids_localisation, localised(0.7, 4.0, 0.2))
+    some = verdicts(localisation, localised(0.7, 4.0, 0.2))
     assert some["helps"] == "reproduced"
     assert some["halves-the-error"] == "not reproduced"
 
 
 def chosen(
     allowed: float, odometry: float, out: float, lost: float, wrong: float = 10.0
-) -> grids_landmarks.Study:
+) -> Study[choice.Run]:
     """Ratios of errors to those with moving things forbidden; shares found out and wrongly lost."""
     config = choice.ChoiceConfig(runs=8)
     wobble = np.exp(0.05 * np.random.default_rng(4).standard_normal((8, 3)))
     rmse = np.array([1.0, allowed, odometry]) * wobble
     ones = np.ones((8, 3))
-    return grids_landmarks.Study(
-        config, rmse, 20 * ones, 10 * ones, wrong * ones, out * wrong * ones, lost * 10 * ones
-    )
+    counts = (20 * ones, 10 * ones, wrong * ones, out * wrong * ones, lost * 10 * ones)
+    return Study(config, choice.Run(rmse, *counts))
 
 
 def test_the_claims_on_the_choice() -> None:
     names = ("moving-landmarks-harm", "landmarks-help", "found-out", "good-ones-stay")
-    assert verdicts(grids_landmarks, chosen(1.5, 2.0, 1.0, 0.0)) == dict.fromkeys(names, "reproduced")
-    assert verdicts(grids_landmarks, chosen(0.9, 0.8, 0.5, 0.3)) == dict.fromkeys(names, "not reproduced")
-    assert verdicts(grids_landmarks, chosen(1.5, 2.0, 1.0, 0.0, wrong=0.0))["found-out"] == "not testable"
+    assert verdicts(landmarks, chosen(1.5, 2.0, 1.0, 0.0)) == dict.fromkeys(names, "reproduced")
+    assert verdicts(landmarks, chosen(0.9, 0.8, 0.5, 0.3)) == dict.fromkeys(names, "not reproduced")
+    assert verdicts(landmarks, chosen(1.5, 2.0, 1.0, 0.0, wrong=0.0))["found-out"] == "not testable"
 
 
 SMALL = FloorPlanConfig(
@@ -123,12 +125,12 @@ def test_a_map_that_says_what_is_true_gets_full_marks() -> None:
         duration=2.5,
     )
     recording = simulate(world, np.random.default_rng(1))
-    run = separation.measure(recording, separation.SeparationConfig(map=MapConfig(d_memory="text")))
-    precision, recall = separation.precision_recall(run.static[0])
+    run = counting.measure(recording, counting.SeparationConfig(map=MapConfig(d_memory="text")))
+    precision, recall = counting.precision_recall(run.static[0])
     assert precision == 1.0
     assert recall > 0.95  # grazed cells of thin walls are crossed more often than hit
     assert run.moving[2] == 0.0
-    assert separation.precision_recall(np.zeros(4)).tolist() == [1.0, 1.0]
+    assert counting.precision_recall(np.zeros(4)).tolist() == [1.0, 1.0]
 
 
 def test_the_truth_of_a_cell_is_that_of_the_last_look() -> None:
@@ -137,7 +139,7 @@ def test_the_truth_of_a_cell_is_that_of_the_last_look() -> None:
 
     world = dataclasses.replace(SMALL, crowd=CrowdConfig(density=0.0), memory=1.0)
     recording = simulate(world, np.random.default_rng(4))
-    run = separation.measure(recording, separation.SeparationConfig(map=MapConfig(d_memory="text")))
+    run = counting.measure(recording, counting.SeparationConfig(map=MapConfig(d_memory="text")))
     cells = cover(recording)
     first, last = (cell_truth(recording, k, cells).static for k in (0, len(recording) - 1))
     ended = np.zeros(cells.shape, dtype=int)
@@ -152,11 +154,11 @@ def test_beams_are_judged_by_what_they_end_on() -> None:
     recording = simulate(dataclasses.replace(SMALL, memory=1.0), np.random.default_rng(2))
     assert recording.moving[25:, 1].any()
     assert not recording.moving[25:, 1].all()
-    config = localisation.LocalisationConfig().slam
-    poses, total, _ = localisation.localise(recording, config)
+    config = following.LocalisationConfig().slam
+    poses, total, _ = following.localise(recording, config)
     assert total[0] <= min(total[1], total[2])
     assert total[2] > 100
-    from vslam_ref.experiments.moving.readings import increment_of, scan_of
+    from vslam_ref.experiments.grids.beams import increment_of, scan_of
     from vslam_ref.systems.grid_slam import GridSlam
 
     slam, mine = GridSlam(recording.poses[0], config), np.zeros(3)
@@ -180,7 +182,7 @@ def test_the_ideal_scan_lacks_what_moves_and_nothing_else() -> None:
     recording = simulate(SMALL, np.random.default_rng(2))
     lost = 0
     for k in range(0, len(recording), 7):
-        whole, kept = recording.ranges[k], localisation.without_moving(recording, k).ranges
+        whole, kept = recording.ranges[k], following.without_moving(recording, k).ranges
         for i, owner in enumerate(recording.owner[k].tolist()):
             moves = owner >= 0 and bool(recording.moving[k, owner])
             assert np.isnan(kept[i]) if moves else np.array_equal(kept[i], whole[i], equal_nan=True)
@@ -189,12 +191,12 @@ def test_the_ideal_scan_lacks_what_moves_and_nothing_else() -> None:
 
 
 def test_modes_differ_in_one_thing_each() -> None:
-    base = localisation.LocalisationConfig().slam
-    assert localisation.mode_of(base, "robust", "separated") == base
-    assert localisation.mode_of(base, "robust", "ideal") == base, "only its scans are others"
-    plain = localisation.mode_of(base, "robust", "plain")
+    base = following.LocalisationConfig().slam
+    assert following.mode_of(base, "robust", "separated") == base
+    assert following.mode_of(base, "robust", "ideal") == base, "only its scans are others"
+    plain = following.mode_of(base, "robust", "plain")
     assert plain == dataclasses.replace(base, separate=False)
-    squares = localisation.mode_of(base, "squares", "separated")
+    squares = following.mode_of(base, "squares", "separated")
     assert squares.matching.cut == squares.matching.search_cut == np.inf
     assert dataclasses.replace(squares, matching=base.matching) == base
 
@@ -203,28 +205,32 @@ def test_wrong_poses_make_a_worse_dynamic_map() -> None:
     recording = simulate(SMALL, np.random.default_rng(3))
     config = MapConfig(d_memory="text")
     right, wrong = (
-        localisation.spoiled_counts(recording, config, s, 5.0, np.random.default_rng(1)) for s in (0.0, 0.3)
+        following.spoiled_counts(recording, config, s, 5.0, np.random.default_rng(1)) for s in (0.0, 0.3)
     )
-    assert localisation.f_score(right) > localisation.f_score(wrong)
-    assert localisation.f_score(np.array([0.0, 0.0, 0.0])) == 1.0
-    assert localisation.f_score(np.array([5.0, 10.0, 5.0])) == pytest.approx(2 / 3)
+    assert following.f_score(right) > following.f_score(wrong)
+    assert following.f_score(np.array([0.0, 0.0, 0.0])) == 1.0
+    assert following.f_score(np.array([5.0, 10.0, 5.0])) == pytest.approx(2 / 3)
 
 
 def test_runs_depend_on_their_seed_only() -> None:
     """Whatever was spawned from the seed's object before, as other workers do."""
     seed = np.random.SeedSequence(5).spawn(2)[1]
-    first = generator(seed).spawn(2)[0].uniform()
+    task = Task(
+        lambda config, point, seed: np.random.default_rng(seed).spawn(2)[0].uniform(), None, None, seed
+    )
+    first = carry_out(task)
     seed.spawn(3)
-    assert generator(seed).spawn(2)[0].uniform() == first
+    assert carry_out(task) == first
+    assert carry_out(task._replace(unit=np.random.SeedSequence(5).spawn(2)[1])) == first
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("id", STUDIES)
 def test_the_quick_study_runs_and_draws(id: str) -> None:
     experiment = load(id)
-    result = experiment.run(experiment.configure(quick=True), RunContext())
-    assert len(experiment.claims(result)) >= 4
-    assert experiment.figure(result).axes
+    study = experiment.run(experiment.configure(quick=True))
+    assert len(experiment.claims(study)) >= 4
+    assert experiment.figure(study).axes
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import catalogue
-from vslam_ref.experiments import multiview_fig1_1 as experiment
-from vslam_ref.experiments.framework import InputError, Result, RunContext, load
+from vslam_ref.experiments.framework import Study, load
+from vslam_ref.experiments.multiview import fig1_1
 from vslam_ref.experiments.multiview.scene import MultiviewConfig, World, simulated
 from vslam_ref.experiments.multiview.study import (
-    Study,
+    Reconstruction,
     exchange,
     pairwise_distance,
     points_of_the_others,
@@ -20,6 +20,7 @@ from vslam_ref.experiments.multiview.study import (
 )
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview import Views
+from vslam_ref.support.errors import InputError
 
 CONFIG = MultiviewConfig(every=4)
 LINES, FRONT, PLACE, CAMERA, WRONG = (
@@ -34,11 +35,11 @@ needs_data = pytest.mark.skipif(
 )
 
 
-def verdicts(study: Study) -> dict[str, str]:
-    return {c.id: c.verdict for c in experiment.claims(Result({}, payload=study))}
+def verdicts(study: Reconstruction) -> dict[str, str]:
+    return {c.id: c.verdict for c in fig1_1.claims(Study(study.config, None, study))}
 
 
-def failing(study: Study) -> set[str]:
+def failing(study: Reconstruction) -> set[str]:
     return {id for id, verdict in verdicts(study).items() if verdict != "reproduced"}
 
 
@@ -49,11 +50,11 @@ def world() -> World:
 
 
 @pytest.fixture(scope="module")
-def study(world: World) -> Study:
+def study(world: World) -> Reconstruction:
     return study_world(CONFIG, world)
 
 
-def test_all_claims_hold_in_a_world_as_the_cameras_say(study: Study) -> None:
+def test_all_claims_hold_in_a_world_as_the_cameras_say(study: Reconstruction) -> None:
     assert verdicts(study) == dict.fromkeys((LINES, FRONT, PLACE, CAMERA, WRONG), "reproduced")
     assert len(study.resected) == 4
     assert all(r.robust.iterations > 0 and r.start.iterations == 0 for r in study.resected)
@@ -104,13 +105,13 @@ def test_a_wrong_match_is_seen_by_its_pairs_and_pixels_are_exchanged_as_said(wor
     assert sorted(wrong[:, 0].tolist()) == pixels[:, 0].tolist()
 
 
-def with_record(study: Study, **changes: object) -> Study:
+def with_record(study: Reconstruction, **changes: object) -> Reconstruction:
     """One picture's record changed: all pictures must keep a rule."""
     first, *rest = study.resected
     return study._replace(resected=(first._replace(**changes), *rest))
 
 
-def test_one_picture_is_enough_to_fail(study: Study) -> None:
+def test_one_picture_is_enough_to_fail(study: Reconstruction) -> None:
     first = study.resected[0]
     assert failing(with_record(study, held_out_px=1.1)) == {PLACE}
     for field, value in (("turn", 1.1), ("shift", 0.011), ("rmse_px", 1.1), ("iterations", 0)):
@@ -148,7 +149,7 @@ def test_a_principal_point_that_is_off_is_found_where_cameras_hang_both_ways(wor
     assert abs(found.shift_px[0]) > 4 * found.shift_sd_px[0]
 
 
-def test_cameras_that_hang_one_way_say_too_little(study: Study) -> None:
+def test_cameras_that_hang_one_way_say_too_little(study: Reconstruction) -> None:
     assert study.shift_px.tolist() == [0.0, 0.0]
     assert study.shift_sd_px.max() > CONFIG.shift_known_px
 
@@ -156,17 +157,17 @@ def test_cameras_that_hang_one_way_say_too_little(study: Study) -> None:
 def test_without_pictures_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VSLAM_REF_DATA", "")
     loaded = load("multiview-fig1.1")
-    result = loaded.run(loaded.configure(quick=True), RunContext())
-    assert set(verdicts(result.payload).values()) == {"not testable"}
-    assert result.series["real"] is False
+    result = loaded.run(loaded.configure(quick=True))
+    assert set(verdicts(result.once).values()) == {"not testable"}
+    assert loaded.series(result)["real"] is False
     assert "a simulation" in loaded.figure(result).axes[0].get_title()
 
 
 @needs_data
 def test_the_temple() -> None:
     loaded = load("multiview-fig1.1")
-    result = loaded.run(loaded.configure(quick=True), RunContext())
-    study: Study = result.payload
+    result = loaded.run(loaded.configure(quick=True))
+    study: Reconstruction = result.once
     assert verdicts(study) == dict.fromkeys((LINES, FRONT, PLACE, CAMERA, WRONG), "reproduced")
     # the data's own note: 0.17 and 0.23 px, with another SIFT
     filed = study.pair_px_as_filed
@@ -191,7 +192,7 @@ def test_settings_that_mean_nothing_are_refused(setting: str, words: str) -> Non
         load("multiview-fig1.1").configure(overrides=[setting])
 
 
-def test_the_same_seed_gives_the_same_numbers(world: World, study: Study) -> None:
+def test_the_same_seed_gives_the_same_numbers(world: World, study: Reconstruction) -> None:
     again = study_world(dataclasses.replace(CONFIG, every=8), world)
     mine = {r.view: r for r in study.resected}
     assert all(r == mine[r.view] for r in again.resected)

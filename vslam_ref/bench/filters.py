@@ -32,13 +32,13 @@ import numpy as np
 from vslam_ref.bench.filterpy_peer import WAYS, filterpy_step
 from vslam_ref.bench.imports import imports
 from vslam_ref.bench.rows import Row, each_backend, row
-from vslam_ref.filters import vehicle
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import EkfSlam, ekf_predict_in_place, ekf_update_in_place
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.support.timing import paired
+from vslam_ref.worlds.drive import Drive, field_drive, follow
 from vslam_ref.worlds.mapped_vehicle import PAPER_POSE_RATIO, SEEN, MappedVehicle, cycle_ratios
-from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
+from vslam_ref.worlds.vehicle_field import VehicleFieldConfig, draw_noise, make_field
 
 SIZES = (10, 20, 50, 100, 200)
 P0_LOW, P0_HIGH = (1.0, 1.0, 0.001), (1.0, 1.0, 0.03)
@@ -138,18 +138,10 @@ def drive(config: VehicleFieldConfig, form: str, runs: int) -> None:
     noise = draw_noise(world, [np.random.default_rng(k) for k in range(runs)])
     for variances in (P0_LOW, P0_HIGH):
         start, P0 = world.T_world_vehicle[0] + noise.start * np.sqrt(variances), np.diag(variances)
-        _through(EkfSlam(start, P0), world, noise)
-        _through(carleman_ekf(start, P0, form), world, noise)
+        _to_the_end(EkfSlam(start, P0), field_drive(world, noise))
+        _to_the_end(carleman_ekf(start, P0, form), field_drive(world, noise))
 
 
-def _through(slam: SlamFilter, world: VehicleField, noise: Noise) -> None:
-    c = world.config
-    controls = world.controls + noise.controls * np.array([c.sigma_v, c.sigma_phi])
-    pairs = zip(world.sightings, noise.sightings, strict=True)
-    seen = {s.step: (s.ids, s.z + c.sigma_z * e) for s, e in pairs}
-    for k in range(controls.shape[1] + 1):
-        if k:
-            slam.predict(vehicle.ackermann_increment(controls[:, k - 1], c.cov_u, c.wheelbase, c.dt))
-        if k in seen:
-            slam.update(*seen[k], c.cov_z)
-        slam.pose()
+def _to_the_end(slam: SlamFilter, course: Drive) -> None:
+    for _ in follow(slam, course):
+        pass

@@ -50,7 +50,7 @@ def contents() -> dict[str, Any]:
     from vslam_ref.chapters import CHAPTERS
     from vslam_ref.datasets.catalogue import find
     from vslam_ref.datasets.known import DATA_SETS
-    from vslam_ref.experiments.framework.registry import summaries
+    from vslam_ref.experiments.registry import summaries
 
     folders = {data_set.name: find(data_set.name) for data_set in DATA_SETS}
     return {

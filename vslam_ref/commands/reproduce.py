@@ -14,8 +14,9 @@ from vslam_ref.commands.options import add_json, at_least, json_target, write_js
 
 if TYPE_CHECKING:
     from vslam_ref.experiments.framework.claims import Claim
-    from vslam_ref.experiments.framework.experiment import Experiment, RunContext
+    from vslam_ref.experiments.framework.experiment import Experiment
     from vslam_ref.experiments.framework.reproduce import Outcome
+    from vslam_ref.experiments.framework.scheduler import RunContext
 
 HELP = "draw a paper's figure again, with a verdict on every claim"
 EPILOG = """\
@@ -26,9 +27,12 @@ examples:
   vslam-ref reproduce iekf-fig2 --scheduler dask --dask-address tcp://head:8786
 
 '--set' takes the keys of "config" in result.json. Options apply in the order --quick, --runs, --seed, --set.
+An interrupted command goes on where it stopped when it is given again.
+'runs.npz' holds per-run arrays; "arrays" in result.json says what each of them is.
 Exit status: 0 done, whatever the verdicts say; with --strict 1 if a claim is not reproduced; 2 bad input."""
 
 FAILED = "not reproduced"
+QUICK = "; quick run: small samples, whose verdicts show that everything works, not who is right"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check everything, then run the experiments one after the other."""
+    from vslam_ref import _kernels
     from vslam_ref.experiments.framework import reproduce as framework
     from vslam_ref.support import files
 
@@ -66,12 +71,14 @@ def run(options: argparse.Namespace) -> int:
     target = json_target(options)
     out = files.require_folder(options.out)
 
-    outcomes = []
-    for number, (experiment, config) in enumerate(work, 1):
+    def begin(number: int, experiment: Experiment[Any]) -> None:
         print(f"[{number}/{len(work)}] {experiment.id}: {experiment.title}", file=sys.stderr, flush=True)
-        for outcome in framework.reproduce([(experiment, config)], context, out):
-            _print_outcome(outcome)
-            outcomes.append(outcome)
+
+    print(f"backend {_kernels.backend()}{QUICK if options.quick else ''}", flush=True)
+    outcomes = []
+    for outcome in framework.reproduce(work, context, out, options.quick, begin):
+        _print_outcome(outcome)
+        outcomes.append(outcome)
     verdicts = [claim.verdict for outcome in outcomes for claim in outcome.claims]
     _print_summary(verdicts, out)
     write_json(target, _numbers(outcomes, out))
@@ -80,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
     """Return each experiment with its config; ``InputError`` before anything has run."""
-    from vslam_ref.experiments.framework.registry import load, summaries
+    from vslam_ref.experiments.registry import load, summaries
     from vslam_ref.support.errors import InputError
 
     if options.all == bool(options.ids):
@@ -105,14 +112,13 @@ def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:
 
 
 def _context(options: argparse.Namespace) -> RunContext:
-    from vslam_ref.experiments.framework.experiment import RunContext
-    from vslam_ref.experiments.framework.scheduler import check_scheduler, dask_client
+    from vslam_ref.experiments.framework.scheduler import RunContext, check_scheduler, dask_client
 
     jobs = options.jobs or _cores()
     check_scheduler(options.scheduler, options.dask_address, jobs)
     if options.scheduler == "dask":
         with dask_client(options.dask_address):
-            pass  # a cluster that cannot be reached is told now, not after the first experiment
+            pass  # a cluster that cannot be reached is reported now, not after the first experiment
     return RunContext(jobs, options.scheduler, options.dask_address, progress=True)
 
 
@@ -127,14 +133,20 @@ def _print_outcome(outcome: Outcome) -> None:
     from vslam_ref.experiments.framework.claims import WORST_FIRST
 
     for claim in sorted(outcome.claims, key=lambda c: WORST_FIRST.index(c.verdict)):
-        print(_claim_line(outcome.experiment.id, claim))
+        print("\n".join(_claim_lines(outcome.experiment.id, claim)))
     print(f"{outcome.experiment.id}: {outcome.seconds:.1f} s, files in {outcome.folder}", flush=True)
 
 
-def _claim_line(experiment: str, claim: Claim) -> str:
+def _claim_lines(experiment: str, claim: Claim) -> list[str]:
+    """Verdict, id, share and the paper's sentence; then what was found, and whether the sample is small."""
+    from vslam_ref.experiments.framework.claims import small_sample_note
+
     share = "share  -  " if claim.share is None else f"share {claim.share:.3f}"
     text = textwrap.shorten(claim.text, 80, placeholder=" ...")
-    return f"{claim.verdict:<14}  {experiment}/{claim.id}  {share}  {text}"
+    lines = [f"{claim.verdict:<14}  {experiment}/{claim.id}  {share}  {text}"]
+    for words in (claim.sentence, small_sample_note(claim.to_dict())):
+        lines += textwrap.wrap(words, 104, initial_indent=" " * 16, subsequent_indent=" " * 16)
+    return lines
 
 
 def _print_summary(verdicts: Sequence[str], out: Path) -> None:
@@ -153,6 +165,7 @@ def _numbers(outcomes: Sequence[Outcome], out: Path) -> dict[str, Any]:
                 "experiment": o.experiment.id,
                 "seed": o.seed,
                 "runs": o.runs,
+                "quick": o.quick,
                 "seconds": o.seconds,
                 "folder": str(o.folder),
                 "claims": [claim.to_dict() for claim in o.claims],

@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     if options.self:
         print_backend()
     if page is not None:
-        from vslam_ref.conformance.report import page as html
+        from vslam_ref.conformance.report import verification_page as html
         from vslam_ref.support import files
 
         files.write_text(page, html(report))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from html import escape
 from pathlib import Path
 
 from vslam_ref.conformance.nees_files import Runs
 from vslam_ref.conformance.nees_runs import MEANINGS, Judgement
-from vslam_ref.conformance.report import STYLE
 from vslam_ref.support import files
+from vslam_ref.support.pages import Html, page, table, tag
 
 
 def write(path: Path, name: str, runs: Runs, found: Judgement) -> None:
@@ -38,25 +37,25 @@ def write(path: Path, name: str, runs: Runs, found: Judgement) -> None:
 
 
 def _page(name: str, found: Judgement, svg: str) -> str:
-    picture = svg[svg.index("<svg") :]  # without the XML declaration
-    mark = "good" if found.consistent else "bad"
-    head = "<tr><th>window</th><th>steps</th><th>mean NEES</th><th>band</th><th>independent steps</th></tr>"
-    rows = "".join(
-        f"<tr><td>{w.name}</td><td>{w.first + 1} to {w.last + 1}</td><td>{w.mean:.3f}</td>"
-        f"<td>{w.low:.3f} to {w.high:.3f}</td><td>{w.independent_steps:.1f}</td></tr>"
-        for w in found.windows
-    )
-    return "".join(
+    rows = [
         [
-            "<!doctype html><html lang='en'><meta charset='utf-8'>",
-            f"<title>Consistency of {escape(name)}</title><style>{STYLE} svg {{ max-width: 100% }}</style>",
-            f"<h1>Consistency of <code>{escape(name)}</code></h1>",
-            f"<p class='{mark}'><strong>{found.verdict}</strong>: {MEANINGS[found.verdict]}.</p>",
-            f"<p>{found.runs} runs of {found.steps} steps, errors of {found.dof} numbers. ",
-            f"An honest filter is called otherwise in about {100 * found.false_alarm:g} % ",
-            "of such studies.</p>",
-            f"<table>{head}{rows}</table>",
-            picture,
-            "</html>\n",
+            w.name, f"{w.first + 1} to {w.last + 1}", f"{w.mean:.3f}", f"{w.low:.3f} to {w.high:.3f}",
+            f"{w.independent_steps:.1f}",
         ]
+        for w in found.windows
+    ]  # fmt: skip
+    heads = ["window", "steps", "mean NEES", "band", "independent steps"]
+    words = (
+        f"{found.runs} runs of {found.steps} steps, errors of {found.dof} numbers. An honest filter is "
+        "called "
+        f"otherwise in about {100 * found.false_alarm:g} % of such studies."
+    )
+    verdict = tag("strong", found.verdict)
+    return page(
+        f"Consistency of {name}",
+        tag("p", verdict, f": {MEANINGS[found.verdict]}.", class_="good" if found.consistent else "bad"),
+        tag("p", words),
+        table(heads, rows, caption="Windows", kind="numbers"),
+        Html(svg[svg.index("<svg") :]),  # without the XML declaration
+        heading=Html(f"Consistency of {tag('code', name)}"),
     )

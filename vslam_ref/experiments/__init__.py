@@ -1,6 +1,6 @@
-"""Floor 6: one module per figure, table or claim that is drawn again.
+"""Floor 6: figures, tables and claims that are drawn again, one folder per family.
 
-``framework/`` holds what they share (settings, claims, the scheduler, the writer of results).  Every
-other module that ends in ``EXPERIMENT = Experiment(...)`` is an experiment; its file name is its id
-with ``_`` for ``-``.  Nothing has to be listed anywhere else.
+A family's folder has the name its ids begin with.  ``framework/`` holds what all share (the driver, claims,
+results on disk); ``registry`` finds the experiments by reading the sources, so nothing has to be listed
+anywhere.  ``slam_log`` and ``grid_log`` are what ``vslam-ref run`` and ``vslam-ref grid`` do with a log.
 """

@@ -78,6 +78,5 @@ def robust_figure(
         panels[0].set(title=f"camera centres, {runs} scenes", ylabel="RMSE, median and quartiles [mm]")
         panels[1].set(title="points", ylabel="RMSE, median and quartiles [mm]")
         panels[2].set(title="broken scenes", ylabel="scenes [%]", ylim=(-4, 104))
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(methods), frameon=False)
+        style.legend_below(figure, panels[0], len(methods))
     return figure

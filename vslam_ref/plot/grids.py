@@ -126,8 +126,7 @@ def chair_figure(
                 )
             axes.set(title=f"{name} table", xlabel="time since it was put down [s]", xlim=(0, since[-1]))
         panels[0].set_ylabel("share of its cells [%]")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+        style.legend_below(figure, panels[0], 2)
     return figure
 
 

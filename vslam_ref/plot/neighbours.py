@@ -52,8 +52,7 @@ def neighbours_figure(
         for axes in panels.flat:
             axes.set_xlim(time[0], time[-1])
             axes.set_xlabel("time [s]")
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        style.legend_below(figure, panels[0, 0], 3)
     return figure
 
 

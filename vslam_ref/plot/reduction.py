@@ -56,6 +56,5 @@ def reduction_figure(time: Array, gap: Mapping[str, Array], *, bound: float) -> 
             f"bound {bound:g}", (0.0, bound), xycoords=("axes fraction", "data"), xytext=(4, 4),
             textcoords="offset points", fontsize=9,
         )  # fmt: skip
-        handles, labels = panels[1].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        style.legend_below(figure, panels[1], 3)
     return figure

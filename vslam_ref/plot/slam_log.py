@@ -74,8 +74,7 @@ def map_figure(runs: Mapping[str, Drawn], truth_path: Array, truth_map: Array, t
             panel.set_aspect("equal", adjustable="datalim")
             panel.set_xlabel("x [m]")
         panels[0].set_ylabel("y [m]")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+        style.legend_below(figure, panels[0], 4)
         figure.suptitle(title, fontsize=12)
     return figure
 

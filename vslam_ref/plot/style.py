@@ -99,3 +99,8 @@ def new_figure(height: float, columns: int = 1, *, sharey: bool = False) -> tupl
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, columns, squeeze=False, sharey=sharey)
     return figure, list(axes[0])
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """Put the names of what is drawn in a panel under the whole figure."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)

@@ -55,6 +55,5 @@ def variants_figure(
             "3 = consistent", (1.0, 3.0), xycoords=("axes fraction", "data"), xytext=(-4, -12),
             textcoords="offset points", ha="right", color=style.GREY, fontsize=9,
         )  # fmt: skip
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+        style.legend_below(figure, panels[0], 4)
     return figure

@@ -8,6 +8,7 @@ module          holds
 ``config``      ``key=value`` settings of frozen dataclasses, and their reasons
 ``json_text``   values as JSON text
 ``provenance``  versions, git commit, platform
-``timing``      ratios of times that hold when the machine's speed drifts
+``pages``       HTML pages of reports; no numeric room imports it
+``timing``      paired timing, for ratios that hold when the machine's speed drifts
 ==============  ==========================================================================
 """

@@ -60,8 +60,9 @@ def settings(config: Any, prefix: str = "") -> Iterator[Setting]:
 
 
 def find_setting(config: Any, name: str) -> str | None:
-    """Return the dotted key of the first setting called ``name``, at any depth, or None."""
-    return next((s.key for s in settings(config) if s.key.rpartition(".")[2] == name), None)
+    """Return the dotted key of the outermost setting called ``name``, or None."""
+    keys = [s.key for s in settings(config) if s.key.rpartition(".")[2] == name]
+    return min(keys, key=lambda key: key.count("."), default=None)
 
 
 def config_to_dict(config: Any) -> dict[str, Any]:

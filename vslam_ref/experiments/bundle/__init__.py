@@ -1,12 +1,13 @@
-"""Simulated bundles with exact truth, and what the three experiments of bundle adjustment measure on them.
+"""What the three experiments of bundle adjustment measure: ``bundle-tukey``, ``-gauge`` and ``-sparsity``.
 
 ===============  ====================================================================================
 module           holds
 ===============  ====================================================================================
-``scene``        cameras on an arc, points, exact pixels; distances that do not depend on the gauge
 ``wrong``        wrong observations; one scene adjusted with every loss
 ``gauges``       one scene adjusted in every gauge; covariances predicted and found
 ``elimination``  Jacobians as matrices; what a factor costs in a given order
-``sparsity``     the arrow matrix, and a walk: problems, and their counts of operations
+``counts``       the arrow matrix, and a walk: problems, and their counts of operations
 ===============  ====================================================================================
+
+The scenes with exact truth are those of ``worlds.bundles``.
 """

@@ -13,6 +13,7 @@ Four ways to live with the seven coordinates that no image shows:
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,9 @@ from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.estimation.bundle.gauge import fix_gauge
 from vslam_ref.estimation.bundle.projection import Links, State, linearise, reprojection
 from vslam_ref.estimation.bundle.result import BundleResult
-from vslam_ref.experiments.bundle.scene import (
+from vslam_ref.experiments.framework.driver import stack
+from vslam_ref.geometry import camera_pose
+from vslam_ref.worlds.bundles import (
     Bundle,
     displacement,
     make_bundle,
@@ -32,7 +35,6 @@ from vslam_ref.experiments.bundle.scene import (
     moved_world,
     nearest_of_family,
 )
-from vslam_ref.geometry import camera_pose
 
 GAUGES = ("free", "fixed", "badly", "tied")
 CHOSEN = ("free", "fixed", "badly")
@@ -86,7 +88,7 @@ class Selection(NamedTuple):
 
 
 class Repetitions(NamedTuple):
-    """A batch of repetitions, runs first.
+    """Repetitions, runs first.
 
     Attributes
     ----------
@@ -121,13 +123,7 @@ class Predicted(NamedTuple):
     invisible: float
 
 
-class GaugeTask(NamedTuple):
-    """A batch."""
-
-    config: GaugeConfig
-    seeds: tuple[np.random.SeedSequence, ...]
-
-
+@lru_cache(maxsize=2)
 def world(config: GaugeConfig) -> tuple[Bundle, Selection]:
     """The scene, the same for all repetitions; and two free views and three points far apart."""
     bundle = make_bundle(config.angles, config.points, np.random.default_rng(config.seed))
@@ -188,16 +184,14 @@ def adjust(bundle: Bundle, uv: Array, moved: Scene, gauge: str) -> BundleResult:
     return bundle_adjust(replace(template, scene=start), None, OPTIONS)
 
 
-def repeat(task: GaugeTask) -> Repetitions:
+def simulate(config: GaugeConfig, point: None, seeds: tuple[np.random.SeedSequence, ...]) -> Repetitions:
+    """A batch of repetitions."""
+    return stack([_once(config, seed) for seed in seeds], seeds)  # type: ignore[no-any-return]
+
+
+def _once(config: GaugeConfig, seed: np.random.SeedSequence) -> Repetitions:
     """Measure anew, adjust in every gauge."""
-    bundle, chosen = world(task.config)
-    rows = [_once(task.config, bundle, chosen, np.random.default_rng(seed)) for seed in task.seeds]
-    return Repetitions(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def _once(
-    config: GaugeConfig, bundle: Bundle, chosen: Selection, rng: np.random.Generator
-) -> tuple[Array, float, Array, Array, bool]:
+    (bundle, chosen), rng = world(config), np.random.default_rng(seed)
     uv = bundle.uv + config.sigma * rng.standard_normal(bundle.uv.shape)
     moved = moved_start(bundle.truth, config.start, config.start, rng)
     results = {gauge: adjust(bundle, uv, moved, gauge) for gauge in GAUGES}
@@ -206,10 +200,10 @@ def _once(
     errors = np.array(
         [_rows(*_error(s, bundle.truth, g), chosen) for s, g in zip(scenes, CHOSEN, strict=True)]
     )
-    told = np.array([invariants(s.X_world[list(chosen.points)]) for s in scenes])
-    apart = float(np.abs(images - images[0]).max())
+    shown = np.array([invariants(s.X_world[list(chosen.points)]) for s in scenes])
+    apart = np.abs(images - images[0]).max()
     cost = np.array([results[g].cost for g in GAUGES])
-    return cost, apart, errors, told, all(r.converged for r in results.values())
+    return Repetitions(cost, apart, errors, shown, np.array(all(r.converged for r in results.values())))
 
 
 def _error(found: Scene, truth: Scene, gauge: str) -> tuple[Array, Array]:

@@ -1,248 +1,251 @@
-"""The arrow matrix of bundle adjustment, drawn; and what its elimination costs, counted in two orders."""
+"""The arrow matrix of bundle adjustment and its Schur complement, drawn from a real problem, and counted.
+
+A real problem (BAL, 16 views and 22106 points; a simulation where it is not found) gives the arrow: the
+normal matrix of all its views and forty of its points, differenced column by column, so that every zero is
+measured.
+A camera that walks along a wall, its pictures shuffled, gives the band.  Costs are multiplications counted on
+the factors of a sparse solver that knows nothing of views and points.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.arrays import Array, IntArray
-from vslam_ref.datasets import catalogue
-from vslam_ref.datasets.bundle_files import read_bal
-from vslam_ref.estimation.bundle import BundleProblem, Freedom, Observations, Scene, reduced_system, schur
-from vslam_ref.estimation.bundle.normal import Normal, normal_equations
-from vslam_ref.estimation.bundle.structure import Structure, structure
-from vslam_ref.experiments.bundle.elimination import (
-    DAMPING,
-    analytic,
-    banded_cost,
-    dense_cost,
-    differenced,
-    elimination_cost,
-    factor_pattern,
-    point_cost,
+from vslam_ref.arrays import Array
+from vslam_ref.experiments.bundle.counts import (
+    Arrow,
+    Counts,
+    SparsityConfig,
+    Walk,
+    arrow,
+    count_orders,
+    real_problem,
+    simulate,
+    views_system,
+    walk,
 )
-from vslam_ref.geometry.cameras import Pinhole
-from vslam_ref.worlds import bundles
-from vslam_ref.worlds.bundles import make_bundle
+from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 
-BAL_FILE = "problem-16-22106-pre.txt.bz2"
-
-
-@dataclass(frozen=True)
-class SparsityConfig:
-    """What is drawn and counted."""
-
-    seed: int = field(default=16, metadata={"reason": "any; fixed for repeatability"})
-    drawn: int = field(default=40, metadata={"reason": "points in the drawing; more hide the blocks"})
-    counted: int = field(
-        default=300, metadata={"reason": "points in the count of both orders: views first fills everything"}
-    )
-    views: tuple[int, ...] = field(
-        default=(15, 30, 60, 120), metadata={"reason": "lengths of the walk; a power law shows"}
-    )
-    points_per_view: int = field(default=12, metadata={"reason": "new points per keyframe of a small map"})
-    reach: float = field(default=2.0, metadata={"reason": "a point is seen by some 8 views", "unit": "m"})
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be counted."""
-        if self.drawn < 5 or self.counted < 20 or self.points_per_view < 4 or not 1 <= self.reach <= 3:
-            raise ValueError("need drawn >= 5, counted >= 20, points_per_view >= 4 and 1 <= reach <= 3")
-        if len(self.views) < 3 or min(self.views) < 10 or list(self.views) != sorted(set(self.views)):
-            raise ValueError(f"views={self.views}: need three or more rising numbers from 10 on")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-class Arrow(NamedTuple):
-    """One drawn problem: H, its columns of views first, and its factors.
-
-    Attributes
-    ----------
-    H : ndarray, shape (d V + 3 N, d V + 3 N)
-        J^T J, with J by central differences of all residuals in all unknowns.
-    points_first, views_first : ndarray of bool, shape (d V + 3 N, d V + 3 N)
-        Where the Cholesky factor has numbers.
-    sees : ndarray of bool, shape (V, N)
-    d : int
-        Columns of a view.
-    real : bool
-    """
-
-    H: Array
-    points_first: NDArray[np.bool_]
-    views_first: NDArray[np.bool_]
-    sees: NDArray[np.bool_]
-    d: int
-    real: bool
+PREDICTED = 1e-9
+"""Relative difference of a count and its formula: none but rounding of large sums."""
+CHEAPER = 10.0
+"""Times that the wrong order costs more."""
+LINEAR, CUBIC = (1.8, 2.3), 7.0
+"""Factors of a cost when a long walk becomes twice as long: linear up to its ends; cubic is 8."""
+SAME = 1e-9
+"""Relative difference of two solutions of one system."""
 
 
-class Counts(NamedTuple):
-    """Operations of one problem, by order of elimination.
+class Drawn(NamedTuple):
+    """What is drawn and counted of the one problem: sizes are views, points and observations."""
 
-    ``points_first`` and ``views_first`` are measured, ``predicted`` is for the former; ``whole`` is the
-    dense matrix.
-    """
-
-    points_first: float
-    predicted: float
-    views_first: float
-    whole: float
+    sizes: tuple[int, int, int]
+    arrow: Arrow
+    counts: Counts
 
 
-class Walk(NamedTuple):
-    """Operations for one length of the walk, points eliminated first everywhere.
-
-    Attributes
-    ----------
-    views : int
-    points : float
-        For the points alone.
-    dense, banded, shuffled : float
-        For S: as a dense matrix; in the package's order, measured; in the file's order, measured.
-    predicted : float
-        For S, in a band of the package's bandwidth.
-    whole : float
-        The dense matrix of all unknowns.
-    difference : float
-        Largest relative difference of the dense and the banded solution.
-    missing, extra : int
-        Pairs of views that share a point and have no block in S; and the other way round.
-    """
-
-    views: int
-    points: float
-    dense: float
-    banded: float
-    shuffled: float
-    predicted: float
-    whole: float
-    difference: float
-    missing: int
-    extra: int
+def drawn(config: SparsityConfig) -> Drawn:
+    """Draw and count."""
+    problem, real = real_problem(config)
+    return Drawn(problem.sizes, arrow(problem, real, config), count_orders(problem, config))
 
 
-def real_problem(config: SparsityConfig) -> tuple[BundleProblem, bool]:
-    """The BAL problem where it is found, else a simulated one; and whether it is real."""
-    folder = catalogue.find("bal")
-    if folder is not None and (folder / BAL_FILE).is_file():
-        return read_bal(folder / BAL_FILE).problem, True
-    rng = np.random.default_rng(config.seed)
-    bundle = make_bundle(np.linspace(-0.7, 0.7, 16), 2 * config.counted, rng)
-    rank = np.argsort(np.argsort(rng.uniform(size=(16, 2 * config.counted)), axis=0), axis=0)
-    keep = rank[bundle.view, bundle.point] < 4  # every point is seen by four of the views
-    seen = Observations(bundle.view[keep], bundle.point[keep], bundle.uv[keep])
-    return BundleProblem(Pinhole, bundle.truth, seen), False
+def walks(study: Study[Walk]) -> Walk:
+    """All counts of the walks, each field (walks,)."""
+    return Walk(*(column[:, 0] for column in study.data))
 
 
-def with_points(problem: BundleProblem, chosen: IntArray) -> BundleProblem:
-    """The problem with some of its points only."""
-    table = np.full(problem.sizes[1], -1)
-    table[chosen] = np.arange(len(chosen))
-    keep = table[problem.seen.point] >= 0
-    part = problem.seen.only(keep)
-    scene = Scene(problem.scene.T_cam_world, problem.scene.X_world[chosen], problem.scene.intrinsics)
-    free = Freedom(problem.free.pose, problem.free.point[chosen], problem.free.intrinsics)
-    seen = Observations(part.view, table[part.point], part.uv)
-    return BundleProblem(problem.model, scene, seen, problem.lens_of_view, free)
+def series(study: Study[Walk]) -> dict[str, object]:
+    """Sizes and counts."""
+    rows = zip(*(column.tolist() for column in walks(study)), strict=True)
+    return {
+        "real": study.once.arrow.real,
+        **dict(zip(("views", "points", "observations"), study.once.sizes, strict=True)),
+        "orders": study.once.counts._asdict(),
+        "walks": [Walk(*row)._asdict() for row in rows],
+    }
 
 
-def walk(views: int, config: SparsityConfig) -> BundleProblem:
-    """A camera that walks along a wall."""
-    return bundles.walk(views, config.seed, config.points_per_view, config.reach)
+SOURCE = "A§1.3.1"
 
 
-def point_columns(problem: BundleProblem) -> tuple[IntArray, int]:
-    """How many views see each point, and the columns of a view."""
-    return np.bincount(problem.seen.point, minlength=problem.sizes[1]), 6 + problem.free.intrinsics.shape[1]
+def claims(study: Study[Walk]) -> list[Claim]:
+    """Judge A's sentence that the sparse structure of the linear equations makes it quick."""
+    w = walks(study)
+    return [_arrow(study.once.arrow), _fill(w), _order(study.once.counts), _growth(w), _band(w)]
 
 
-def arrow(problem: BundleProblem, real: bool, config: SparsityConfig) -> Arrow:
-    """The drawn matrices."""
-    from scipy.sparse import csc_array
-
-    counts, d = point_columns(problem)
-    rng = np.random.default_rng([config.seed, 1])
-    # seen often enough to be determined; by view, so that the drawing has an order
-    chosen = np.sort(rng.choice(np.flatnonzero(counts >= 3), config.drawn, replace=False))
-    part = with_points(problem, chosen)
-    J, sees = differenced(part), np.zeros(part.sizes[:2], dtype=np.bool_)
-    sees[part.seen.view, part.seen.point] = True
-    H, D = csc_array(J.T @ J), d * part.sizes[0]
-    everything = np.arange(H.shape[0])
-    orders = (np.concatenate([everything[D:], everything[:D]]), everything)
-    patterns = [factor_pattern(H, order).toarray() != 0 for order in orders]
-    return Arrow(H.toarray(), patterns[0], patterns[1], sees, d, real)
+def blocks(arrow: Arrow) -> NDArray[np.bool_]:
+    """Which blocks of H hold a number, (V + N, V + N)."""
+    V, N = arrow.sees.shape
+    edges = np.concatenate([arrow.d * np.arange(V), arrow.d * V + 3 * np.arange(N)])
+    return np.add.reduceat(np.add.reduceat(np.abs(arrow.H), edges, axis=0), edges, axis=1) > 0.0
 
 
-def _normal(problem: BundleProblem) -> tuple[Normal, Structure]:
-    table = structure(problem)
-    state, weights = table.state(problem), np.ones(problem.sizes[2])
-    return normal_equations(problem.model, state, table, weights, problem.free.intrinsics), table
-
-
-def views_system(problem: BundleProblem) -> tuple[Array, IntArray]:
-    """S (D, D), slightly damped, in the file's order of views; and the columns in the package's order."""
-    normal, table = _normal(problem)
-    size = schur.diagonals(normal, table)
-    M = schur.point_factor(normal.C, DAMPING * size.point, table.free_point)
-    S, _ = schur.reduce(normal, M, DAMPING * size.view, table)
-    S = np.tril(S) + np.tril(S, -1).T
-    own = table.columns.ravel()
-    return S[np.ix_(own, own)], np.argsort(own)
-
-
-def count_orders(problem: BundleProblem, config: SparsityConfig) -> Counts:
-    """Points first and views first, on a part of the problem."""
-    chosen = np.arange(min(config.counted, problem.sizes[1]))
-    part = with_points(problem, chosen)
-    J = analytic(part)
-    H, (seen, d) = (J.T @ J).tocsc(), point_columns(part)
-    D = d * part.sizes[0]
-    everything = np.arange(H.shape[0])
-    first = elimination_cost(H, np.concatenate([everything[D:], everything[:D]]))[0]
-    last = elimination_cost(H, everything)[0]
-    return Counts(first, point_cost(seen, d) + dense_cost(D), last, dense_cost(len(everything)))
-
-
-def count_walk(views: int, config: SparsityConfig) -> Walk:
-    """All counts for one length of the walk."""
-    problem = walk(views, config)
-    J, table = analytic(problem), structure(problem)
-    H = (J.T @ J).tocsc()
-    D = (6 + problem.free.intrinsics.shape[1]) * views
-    S, by_rank = views_system(problem)
-    points = np.arange(D, H.shape[0])
-    sorted_cost, counts = elimination_cost(H, np.concatenate([points, by_rank]))
-    shuffled_cost, _ = elimination_cost(H, np.concatenate([points, np.arange(D)]))
-    for_points = float(np.sum(counts[: len(points)].astype(np.float64) ** 2))
-    rhs = np.random.default_rng([config.seed, views, 1]).standard_normal(D)
-    difference = _dense_against_banded(S[np.ix_(by_rank, by_rank)], rhs, table)
-    missing, extra = fill_against_covisibility(S, problem)
-    return Walk(
-        views, for_points, dense_cost(D), sorted_cost - for_points, shuffled_cost - for_points,
-        banded_cost(D, table.bandwidth), dense_cost(H.shape[0]), difference, missing, extra,
+def _arrow(arrow: Arrow) -> Claim:
+    V, N = arrow.sees.shape
+    full = blocks(arrow)
+    views = int(np.sum(full[:V, :V])) - V
+    points = int(np.sum(full[V:, V:])) - N
+    wrong = int(np.sum(full[:V, V:] != arrow.sees))
+    return judged(
+        "the-matrix-is-an-arrow",
+        SOURCE,
+        "Views meet points, where they see them; no view meets another view and no point another point",
+        "blocks of J^T J, J differenced: none between two views or two points, and between a view and a "
+        "point exactly where there is an observation",
+        views == points == wrong == 0,
+        f"Of the matrix of {V} views and {N} points {views} blocks lie between two views, {points} between "
+        "two points, "
+        f"and {wrong} are not where an observation is",
+        {
+            "between_views": views, "between_points": points, "wrong": wrong,
+            "observations": int(arrow.sees.sum()), "real": arrow.real,
+        },
     )  # fmt: skip
 
 
-def _dense_against_banded(S: Array, rhs: Array, table: Structure) -> float:
-    """Largest relative difference of the package's two solutions."""
-    solved = []
-    methods: tuple[reduced_system.Method, ...] = ("dense", "banded")
-    for method in methods:
-        factor = reduced_system.factor(S, table.border, table.bandwidth, method)
-        if factor is None:
-            raise ValueError("the reduced system is not positive definite")
-        solved.append(factor.solve(rhs))
-    return float(np.abs(solved[0] - solved[1]).max() / np.abs(solved[0]).max())
+def _fill(w: Walk) -> Claim:
+    missing, extra = int(np.sum(w.missing)), int(np.sum(w.extra))
+    return judged(
+        "two-views-meet-where-they-share-a-point",
+        SOURCE,
+        "Eliminating the points makes two views meet if and only if they see a point in common",
+        "blocks of S in every walk: none missing, none too many",
+        missing == extra == 0,
+        f"In all walks {missing} blocks of S are missing and {extra} are too many",
+        {"missing": missing, "extra": extra},
+    )
 
 
-def fill_against_covisibility(S: Array, problem: BundleProblem) -> tuple[int, int]:
-    """Pairs of views that share a point and have no block in S; and pairs with a block and no such point."""
-    V, N, _ = problem.sizes
-    sees = np.zeros((V, N), dtype=np.int64)
-    sees[problem.seen.view, problem.seen.point] = 1
-    together = sees @ sees.T > 0
-    d = len(S) // V
-    blocks = np.abs(S.reshape(V, d, V, d)).max(axis=(1, 3)) > 0.0
-    return int(np.sum(together & ~blocks)), int(np.sum(blocks & ~together))
+def _order(c: Counts) -> Claim:
+    off = abs(c.points_first / c.predicted - 1.0)
+    return judged(
+        "points-first",
+        SOURCE,
+        "Points first costs what the arrow says; views first fills the matrix",
+        f"counted over predicted operations within {PREDICTED:g} of 1; views first costs > {CHEAPER:g} times "
+        "as much",
+        off < PREDICTED and c.views_first > CHEAPER * c.points_first,
+        f"Points first takes {c.points_first:.3g} multiplications, as predicted to {off:.0e}; views first "
+        "takes "
+        f"{c.views_first / c.points_first:.3g} times as many, and more than {CHEAPER:g} times is asked for",
+        {
+            "predicted": c.predicted,
+            "points_first": c.points_first,
+            "views_first": c.views_first,
+            "dense": c.whole,
+        },
+    )
+
+
+def _doubled(w: Walk, total: Array) -> float:
+    """Factor of a cost when the longest walk is reached from half of it, by the last two lengths."""
+    lengths = np.asarray(w.views, dtype=np.float64)
+    power = np.log(total[-1] / total[-2]) / np.log(lengths[-1] / lengths[-2])
+    return float(2.0**power)
+
+
+def _growth(w: Walk) -> Claim:
+    cost = {"points_and_band": w.points + w.banded, "dense_views": w.dense, "dense_whole": w.whole}
+    factors = {name: _doubled(w, np.asarray(total)) for name, total in cost.items()}
+    band, views, whole = factors.values()
+    return judged(
+        "a-walk-costs-what-it-is-long",
+        SOURCE,
+        "Along a walk the cost is linear with points first and a band, and cubic for dense matrices",
+        f"factor when the walk is twice as long: points and band in {LINEAR}, dense ones > {CUBIC:g}",
+        LINEAR[0] < band < LINEAR[1] and views > CUBIC and whole > CUBIC,
+        f"A walk of twice the length costs {band:.2f} times as much with points first and a band, and "
+        f"{views:.2f} and "
+        f"{whole:.2f} times with dense matrices; linear is 2, cubic 8",
+        factors,
+    )
+
+
+def _band(walks: Walk) -> Claim:
+    w = Walk(*(column[-1] for column in walks))
+    difference = float(np.max(walks.difference))
+    inside = 0.5 * w.predicted <= w.banded <= w.predicted
+    dearer = min(w.shuffled, w.dense) / w.banded
+    return judged(
+        "order-makes-the-band",
+        "house",
+        "Reverse Cuthill-McKee finds the walk's order again: the band costs little and gives the same answer",
+        "longest walk: counted within [0.5, 1] of the full band's formula; the file's order and a dense "
+        f"matrix cost > 5 times as much; dense and banded solutions agree to {SAME:g}",
+        bool(inside and dearer > 5.0 and difference < SAME),
+        f"The band takes {w.banded / w.predicted:.2f} of what a full band would; the file's order or a "
+        "dense matrix take "
+        f"at least {dearer:.3g} times as much, and the solutions agree to {difference:.1e}",
+        {
+            "predicted": w.predicted,
+            "banded": w.banded,
+            "file_order": w.shuffled,
+            "dense": w.dense,
+            "difference": difference,
+        },
+    )
+
+
+def arrays(study: Study[Walk]) -> dict[str, object]:
+    """The drawn matrix, who sees what in it, and the counts of the walks."""
+    return {"H": study.once.arrow.H, "sees": study.once.arrow.sees, **walks(study)._asdict()}
+
+
+def figure(study: Study[Walk]) -> Figure:
+    """The arrow, its two factors, the walk's S in two orders, and operations against length."""
+    from vslam_ref.plot.bundle_sparsity import sparsity_figure
+
+    found: Arrow = study.once.arrow
+    S, by_rank = views_system(walk(study.config, study.config.views[1]))
+    return sparsity_figure(
+        found.H,
+        found.points_first,
+        found.views_first,
+        found.d * len(found.sees),
+        (S, S[np.ix_(by_rank, by_rank)]),
+        {name: np.asarray(column, dtype=np.float64) for name, column in walks(study)._asdict().items()},
+        real=found.real,
+    )
+
+
+COUNT = "multiplications and additions: "
+
+EXPERIMENT = Experiment(
+    id="bundle-sparsity",
+    title="The arrow matrix and its Schur complement",
+    source="A, section 1.3.1",
+    config_type=SparsityConfig,
+    simulate=simulate,
+    points=lambda config: config.views,
+    seeds=lambda config, views: [None],
+    once=drawn,
+    sample=lambda study: len(study.config.views),
+    series=series,
+    arrays=arrays,
+    claims=claims,
+    figure=figure,
+    about={
+        "H": "the drawn matrix J^T J, columns of views first; (columns, columns)",
+        "sees": "which view sees which point; (views, points)",
+        "views": "lengths of the walks; (walks,)",
+        "points": COUNT + "for the points alone; (walks,)",
+        "dense": COUNT + "S as a dense matrix; (walks,)",
+        "banded": COUNT + "S in the package's order; (walks,)",
+        "shuffled": COUNT + "S in the file's order; (walks,)",
+        "predicted": COUNT + "S in a full band; (walks,)",
+        "whole": COUNT + "the dense matrix of all unknowns; (walks,)",
+        "difference": "largest relative difference of the dense and the banded solution; (walks,)",
+        "missing": "pairs of views that share a point and have no block in S; (walks,)",
+        "extra": "pairs of views with a block in S and no point in common; (walks,)",
+    },
+    quick={"views": (15, 30, 60)},
+)

@@ -10,7 +10,7 @@ import numpy as np
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import Options, Robust, Scene, bundle_adjust
 from vslam_ref.estimation.robust import MAD_1D, MAD_NORM_2D, TUNED_95, Tukey, tuned
-from vslam_ref.experiments.bundle.scene import Bundle, make_bundle, moved_start, scene_error
+from vslam_ref.worlds.bundles import Bundle, make_bundle, moved_start, scene_error
 
 METHODS = ("l2", "huber", "tukey", "adaptive", "ptam")
 WIDER = MAD_1D / MAD_NORM_2D
@@ -57,13 +57,6 @@ class WrongConfig:
             raise ValueError("need sigma > 0, 0 < wrong_least <= wrong_most and 0 < spread < 1.5")
         if not all(0 <= s < 1 for s in self.shares) or not {0.0, 0.05, 0.2, 0.4} <= set(self.shares):
             raise ValueError(f"shares={self.shares}: need numbers in [0, 1), among them 0, 0.05, 0.2 and 0.4")
-
-
-class WrongTask(NamedTuple):
-    """One scene."""
-
-    config: WrongConfig
-    seed: np.random.SeedSequence
 
 
 class WrongRun(NamedTuple):
@@ -121,17 +114,17 @@ def measure(bundle: Bundle, config: WrongConfig, rng: np.random.Generator) -> li
     return measured
 
 
-def adjust_wrong(task: WrongTask) -> WrongRun:
+def simulate(config: WrongConfig, at: None, seed: np.random.SeedSequence) -> WrongRun:
     """All methods, all shares, in one scene."""
-    config, rng = task.config, np.random.default_rng(task.seed)
+    rng = np.random.default_rng(seed)
     bundle = make_bundle(np.linspace(-config.spread, config.spread, config.views), config.points, rng)
     near = moved_start(bundle.truth, config.near_turn, config.near_move, rng)
     far = moved_start(bundle.truth, config.far * config.near_turn, config.far * config.near_move, rng)
     measured = measure(bundle, config, rng)
     rows = [[_one(bundle, near, m, robust) for m in measured] for robust in robusts(config.sigma).values()]
     columns = [np.array([[r[k] for r in row] for row in rows]) for k in range(5)]
-    at = measured[config.shares.index(FAR_SHARE)]
-    far_centre = np.array([_one(bundle, far, at, robust)[0] for robust in robusts(config.sigma).values()])
+    judged = measured[config.shares.index(FAR_SHARE)]
+    far_centre = np.array([_one(bundle, far, judged, robust)[0] for robust in robusts(config.sigma).values()])
     centre, turn, point, scale, converged = columns
     return WrongRun(centre, turn, point, scale / config.sigma, converged.astype(np.bool_), far_centre)
 

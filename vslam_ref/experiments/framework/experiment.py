@@ -1,67 +1,27 @@
-"""The record that makes a module an experiment, and what its ``run`` is handed."""
+"""The record that makes a module an experiment: data and a few functions."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vslam_ref.experiments.framework.claims import Claim
-from vslam_ref.experiments.framework.results import Result
-from vslam_ref.experiments.framework.scheduler import run_batches
+from vslam_ref.experiments.framework.driver import Study, Unit, child_seeds, gather, plan, run_plan
+from vslam_ref.experiments.framework.kept import Kept
+from vslam_ref.experiments.framework.scheduler import RunContext
 from vslam_ref.support.config import apply_overrides, find_setting, replace_settings, settings
 from vslam_ref.support.errors import InputError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from vslam_ref.plot.saving import Figure
 
 C = TypeVar("C")
-T = TypeVar("T")
-R = TypeVar("R")
-
-
-@dataclass(frozen=True)
-class RunContext:
-    """How to run, as opposed to what: none of it may change a number of the result.
-
-    Parameters
-    ----------
-    jobs : int
-        Worker processes; 1 stays in this process.
-    scheduler : {"local", "dask"}
-        Where batches go.
-    dask_address : str or None
-        ``tcp://host:port`` of a running Dask scheduler, for ``scheduler="dask"``.
-    progress : bool
-        Show a progress bar on stderr, if that is a terminal.
-    """
-
-    jobs: int = 1
-    scheduler: str = "local"
-    dask_address: str | None = None
-    progress: bool = False
-    _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
-
-    def map(self, function: Callable[[T], R], batches: Sequence[T], label: str = "") -> list[R]:
-        """Return ``[function(b) for b in batches]``, computed where this context says."""
-        return run_batches(
-            function,
-            batches,
-            jobs=self.jobs,
-            scheduler=self.scheduler,
-            dask_address=self.dask_address,
-            progress=self.progress,
-            label=label,
-        )
-
-    def shared(self, key: Hashable, compute: Callable[[], R]) -> R:
-        """Return ``compute()``, run once per key however many experiments of one command ask for it."""
-        if key not in self._shared:
-            self._shared[key] = compute()
-        return self._shared[key]  # type: ignore[no-any-return]
 
 
 def scale_runs(config: C, runs: int) -> C:
@@ -86,6 +46,27 @@ def scale_runs(config: C, runs: int) -> C:
     return replace_settings(config, new)
 
 
+def one_point(config: Any) -> Sequence[Any]:
+    """Return the default design: one point, which needs no name."""
+    return [None]
+
+
+def nothing(config: Any) -> None:
+    """Compute nothing beside the runs."""
+    return None
+
+
+def _runs(study: Study[Any]) -> int | None:
+    return study.runs
+
+
+def fields_as_arrays(study: Study[Any]) -> dict[str, NDArray[Any]]:
+    """Return every field of a study: by its name, or as ``field/point`` where the points have names."""
+    if not isinstance(study.data, dict):
+        return dict(study.data._asdict())
+    return {f"{f}/{name}": a for name, part in study.data.items() for f, a in part._asdict().items()}
+
+
 @dataclass(frozen=True)
 class Experiment(Generic[C]):
     """One figure, table or claim that can be drawn again.
@@ -93,33 +74,61 @@ class Experiment(Generic[C]):
     Parameters
     ----------
     id : str
-        Lower-case words joined by ``-``, or ``.`` in a number; the module has the same name with ``_``.
+        Lower-case words joined by ``-``, or ``.`` in a number; its first word is the module's folder.
     title, source : str
         What it shows; the paper and the place in it.
     config_type : type
         Frozen dataclass, every field with ``metadata={"reason": ..., "unit": ...}``.
-    run : callable
-        ``run(config, context) -> Result``.  All randomness comes from ``config``'s seed.
+    simulate : callable
+        ``simulate(config, point, unit) -> NamedTuple`` of arrays and numbers: one run, or a batch of runs, at
+        one point of the design.  A function at the top level of a module, and a function of its arguments
+        alone.  None where recorded data are looked at, once.
+    series : callable
+        ``series(study) -> mapping``: what the figure draws, for ``result.json``.
     claims : callable
-        ``claims(result) -> list[Claim]``.
+        ``claims(study) -> list[Claim]``.
     figure : callable
-        ``figure(result) -> matplotlib.figure.Figure``.
-    quick : callable
-        ``quick(config) -> config``: a small version that takes seconds (``--quick``).
+        ``figure(study) -> matplotlib.figure.Figure``.
+    about : mapping
+        What each array of ``runs.npz`` is and what its axes are, by its key up to the first ``/``.
+    quick : mapping
+        Dotted keys and values of a small version that takes seconds (``--quick``).
+    points : callable
+        ``points(config) -> sequence``: densities, filters, ...; one point unless given.
+    name : callable, optional
+        ``name(point) -> str``, where points are told apart by name and need not have equally many runs.
+    seeds : callable
+        ``seeds(config, point) -> sequence`` of units: one ``SeedSequence`` per run, a tuple of them per
+        batch, or None where nothing is drawn.
+    once : callable
+        ``once(config)``: what is computed beside the runs, in this process.
+    sample : callable
+        ``sample(study) -> int``: how many runs, or what stands for them, were judged; the setting ``runs``
+        unless given.
+    arrays : callable
+        ``arrays(study) -> mapping`` for ``runs.npz``; all fields unless given.
     defaults : mapping
         Dotted keys that differ from the defaults of ``config_type``.
     with_runs : callable
-        ``with_runs(config, n) -> config`` (``--runs n``); :func:`scale_runs` unless told otherwise.
+        ``with_runs(config, n) -> config`` (``--runs n``); :func:`scale_runs` unless given.
     """
 
     id: str
     title: str
     source: str
     config_type: type[C]
-    run: Callable[[C, RunContext], Result]
-    claims: Callable[[Result], list[Claim]]
-    figure: Callable[[Result], Figure]
-    quick: Callable[[C], C]
+    simulate: Callable[[Any, Any, Any], Any] | None
+    series: Callable[[Study[Any]], Mapping[str, Any]]
+    claims: Callable[[Study[Any]], list[Claim]]
+    figure: Callable[[Study[Any]], Figure]
+    about: Mapping[str, str]
+    quick: Mapping[str, Any] = field(default_factory=dict)
+    points: Callable[[Any], Sequence[Any]] = one_point
+    name: Callable[[Any], str] | None = None
+    seeds: Callable[[Any, Any], Sequence[Unit]] = child_seeds
+    once: Callable[[Any], Any] = nothing
+    sample: Callable[[Study[Any]], int | None] = _runs
+    arrays: Callable[[Study[Any]], Mapping[str, Any]] = fields_as_arrays
     defaults: Mapping[str, Any] = field(default_factory=dict)
     with_runs: Callable[[C, int], C] = scale_runs
 
@@ -130,6 +139,33 @@ class Experiment(Generic[C]):
             raise ValueError(f"experiment {self.id!r}: config_type must be a dataclass")
         if not self.config_type.__dataclass_params__.frozen:  # type: ignore[attr-defined]
             raise ValueError(f"experiment {self.id!r}: config_type must be a frozen dataclass")
+
+    def run(self, config: C, context: RunContext | None = None, kept: Kept | None = None) -> Study[Any]:
+        """Simulate everything; results are the same bytes wherever and in however many parts it is run.
+
+        Parameters
+        ----------
+        config : object
+            See :meth:`configure`.
+        context : RunContext, optional
+            Where the runs are computed; in this process when left out.
+        kept : Kept, optional
+            Batches that an earlier, interrupted run has finished.
+        """
+        if self.simulate is None:
+            return Study(config, None, self.once(config))
+        points = self.points(config)
+        work = plan(self.simulate, config, points, self.seeds)
+        results = run_plan(work, context or RunContext(), kept or Kept(), self.id)
+        return Study(config, gather(work, results, points, self.name), self.once(config))
+
+    def judge(self, study: Study[Any], quick: bool = False) -> tuple[Claim, ...]:
+        """Return the claims, with the number of runs they were judged on and whether it was a quick run."""
+        sample = self.sample(study)
+        return tuple(
+            dataclasses.replace(c, quick=quick, runs=sample if c.runs is None and c.least_runs else c.runs)
+            for c in self.claims(study)
+        )
 
     def default(self) -> C:
         """Return the config used when nothing is asked for."""
@@ -152,7 +188,7 @@ class Experiment(Generic[C]):
         """
         try:
             config = self.default()
-            config = self.quick(config) if quick else config
+            config = replace_settings(config, self.quick) if quick else config
             config = self.with_runs(config, runs) if runs is not None else config
             if seed is not None:
                 key = find_setting(config, "seed")

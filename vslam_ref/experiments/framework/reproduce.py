@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vslam_ref import _kernels
 from vslam_ref.experiments.framework import report, writer
 from vslam_ref.experiments.framework.claims import Claim
-from vslam_ref.experiments.framework.experiment import Experiment, RunContext
+from vslam_ref.experiments.framework.driver import Study
+from vslam_ref.experiments.framework.experiment import Experiment
+from vslam_ref.experiments.framework.kept import Kept, kept_beside
+from vslam_ref.experiments.framework.scheduler import RunContext
 from vslam_ref.support import files
+from vslam_ref.support.config import config_to_dict
+
+Work = Sequence[tuple[Experiment[Any], Any]]
 
 
 @dataclass(frozen=True)
@@ -24,21 +31,33 @@ class Outcome:
     seed: int | None
     runs: int | None
     seconds: float
+    quick: bool = False
 
 
 def reproduce(
-    work: Sequence[tuple[Experiment[Any], Any]], context: RunContext, out: Path
+    work: Work,
+    context: RunContext,
+    out: Path,
+    quick: bool = False,
+    begin: Callable[[int, Experiment[Any]], None] | None = None,
 ) -> Iterator[Outcome]:
     """Run each (experiment, config) in turn; write ``out/<id>`` and renew ``out/index.html`` after each.
+
+    Experiments that simulate the same with the same config, one after the other, share their runs.  Finished
+    batches are kept beside ``out`` until the experiments that need them are written.
 
     Parameters
     ----------
     work : sequence of (Experiment, config)
         What to run, in this order.
     context : RunContext
-        Shared by all, so that experiments of one study run it once.
+        Where it is computed.
     out : Path
         Made if missing.
+    quick : bool
+        Whether the configs are those of a quick run: results say so.
+    begin : callable, optional
+        Called with the number, from 1 on, and the experiment that is begun.
 
     Yields
     ------
@@ -47,13 +66,28 @@ def reproduce(
     """
     out = files.require_folder(out)
     files.clean(out)
-    for experiment, config in work:
+    shared: tuple[Any, Study[Any], Kept] | None = None
+    for number, (experiment, config) in enumerate(work, 1):
+        if begin is not None:
+            begin(number, experiment)
         start = time.perf_counter()
-        result = experiment.run(config, context)
+        same = experiment.simulate, experiment.once, config
+        if shared is None or shared[0] != same:
+            if shared is not None:
+                shared[2].remove()
+            kept = kept_beside(out, experiment.id, config_to_dict(config), _kernels.backend())
+            shared = same, experiment.run(config, context, kept), kept
         seconds = time.perf_counter() - start
-        claims = tuple(experiment.claims(result))
-        content = writer.document(experiment, config, result, claims, seconds)
-        folder = out / experiment.id
-        writer.write_folder(folder, content, result.arrays, experiment.figure(result))
-        report.write_index(out)
-        yield Outcome(experiment, claims, folder, result.seed, result.runs, seconds)
+        yield _write(experiment, shared[1], out, seconds, quick)
+    if shared is not None:
+        shared[2].remove()
+
+
+def _write(experiment: Experiment[Any], study: Study[Any], out: Path, seconds: float, quick: bool) -> Outcome:
+    """Judge, draw and write one experiment."""
+    claims = experiment.judge(study, quick)
+    folder = out / experiment.id
+    content = writer.document(experiment, study, claims, seconds, quick)
+    writer.write_folder(folder, content, experiment.arrays(study), experiment.figure(study))
+    report.write_index(out)
+    return Outcome(experiment, claims, folder, content["seed"], content["runs"], seconds, quick)

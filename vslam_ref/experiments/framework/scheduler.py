@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from vslam_ref import __version__
+from vslam_ref.experiments.framework.progress import Progress, compile_once
 from vslam_ref.support.errors import InputError
 
 T = TypeVar("T")
@@ -29,49 +30,96 @@ DASK_TIMEOUT = 10.0
 _chosen_for_good: list[Any] = []
 
 
-def run_batches(
-    function: Callable[[T], R],
-    batches: Sequence[T],
-    jobs: int = 1,
-    scheduler: str = "local",
-    dask_address: str | None = None,
-    progress: bool = False,
-    label: str = "",
-) -> list[R]:
-    """Return ``[function(batch) for batch in batches]``.
+@dataclass(frozen=True)
+class RunContext:
+    """How to run, as opposed to what: none of it may change a number of the result.
 
     Parameters
     ----------
-    function : callable
-        A function at the top level of a module, so that workers can import it.
-    batches : sequence
-        Its arguments; whatever randomness it needs comes with them.
     jobs : int
-        Worker processes (local scheduler); 1 computes in this process.
+        Worker processes; 1 stays in this process.
     scheduler : {"local", "dask"}
-        joblib's processes, or a Dask cluster that is already running.
+        Where batches go.
     dask_address : str or None
-        ``tcp://host:port`` of the Dask scheduler.
+        ``tcp://host:port`` of a running Dask scheduler, for ``scheduler="dask"``.
     progress : bool
-        Progress bar on stderr, silent where that is no terminal.
-    label : str
-        What the bar says.
-
-    Raises
-    ------
-    InputError
-        If the scheduler is unknown or cannot be reached, or ``jobs`` is less than 1.
+        Show on stderr how many runs are done.
     """
-    check_scheduler(scheduler, dask_address, jobs)
-    if scheduler == "local" and min(jobs, len(batches)) <= 1:
-        with _one_thread():
-            return list(_bar((function(batch) for batch in batches), len(batches), progress, label))
-    with _joblib_backend(scheduler, dask_address, min(jobs, max(len(batches), 1)), function.__module__):
-        import joblib
 
-        task = _Task(function, _current_backend())
-        results = joblib.Parallel(return_as="generator")(joblib.delayed(task)(batch) for batch in batches)
-        return list(_bar(results, len(batches), progress, label))
+    jobs: int = 1
+    scheduler: str = "local"
+    dask_address: str | None = None
+    progress: bool = False
+
+    def map(
+        self,
+        function: Callable[[T], R],
+        batches: Sequence[T],
+        label: str = "",
+        *,
+        sizes: Sequence[int] | None = None,
+        already: int = 0,
+        finished: Callable[[int, R], None] | None = None,
+    ) -> list[R]:
+        """Return ``[function(b) for b in batches]``, computed where this context says.
+
+        Parameters
+        ----------
+        function : callable
+            A function at the top level of a module, so that workers can import it.
+        batches : sequence
+            Its arguments; whatever randomness it needs comes with them.
+        label : str
+            What the progress says.
+        sizes : sequence of int, optional
+            Runs in each batch; 1 unless given.
+        already : int
+            Runs that were done before.
+        finished : callable, optional
+            Called with the number and the result of each batch, in order, as soon as it is there.
+
+        Raises
+        ------
+        InputError
+            If the scheduler is unknown or cannot be reached, or ``jobs`` is less than 1.
+        """
+        check_scheduler(self.scheduler, self.dask_address, self.jobs)
+        sizes = [1] * len(batches) if sizes is None else sizes
+        results: list[R] = []
+        with (
+            Progress(label, already + sum(sizes), already, self.progress) as progress,
+            self._results(function, batches) as arriving,
+        ):
+            for number, result in enumerate(arriving):
+                if finished is not None:
+                    finished(number, result)
+                results.append(result)
+                progress.add(sizes[number])
+        return results
+
+    @contextmanager
+    def _results(self, function: Callable[[T], R], batches: Sequence[T]) -> Iterator[Iterable[R]]:
+        """Yield the results as they come, in the order of the batches."""
+        jobs = min(self.jobs, max(len(batches), 1))
+        if self.scheduler == "local" and jobs <= 1:
+            if self.progress and batches:
+                compile_once()
+            with _one_thread():
+                yield (function(batch) for batch in batches)
+            return
+        if self.progress and self.scheduler == "local":
+            compile_once()
+        with _joblib_backend(self.scheduler, self.dask_address, jobs, function.__module__):
+            import joblib
+
+            task = _Task(function, _current_backend())
+            yield joblib.Parallel(return_as="generator")(joblib.delayed(task)(batch) for batch in batches)
+
+
+def run_batches(function: Callable[[T], R], batches: Sequence[T], **how: Any) -> list[R]:
+    """Return ``[function(batch) for batch in batches]``; ``how`` is a :class:`RunContext`'s."""
+    label = how.pop("label", "")
+    return RunContext(**how).map(function, batches, label)
 
 
 def check_scheduler(scheduler: str, dask_address: str | None, jobs: int = 1) -> None:
@@ -220,15 +268,3 @@ def _one_thread() -> Iterator[None]:
         finally:
             if numba:
                 numba.set_num_threads(before)
-
-
-def _bar(items: Iterable[R], total: int, progress: bool, label: str) -> Iterable[R]:
-    if not progress:
-        return items
-    from tqdm import tqdm
-
-    # disable=None: silent where stderr is no terminal
-    bar: Iterable[R] = tqdm(
-        items, total=total, desc=label or None, disable=None, leave=False, file=sys.stderr
-    )
-    return bar

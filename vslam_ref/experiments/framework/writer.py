@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vslam_ref.experiments.framework.claims import Claim, check_distinct
-from vslam_ref.experiments.framework.experiment import Experiment
-from vslam_ref.experiments.framework.results import Result
 from vslam_ref.support import files
 from vslam_ref.support.config import assumptions, config_to_dict
 from vslam_ref.support.json_text import to_json
@@ -20,6 +19,8 @@ from vslam_ref.support.provenance import versions
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from vslam_ref.experiments.framework.driver import Study
+    from vslam_ref.experiments.framework.experiment import Experiment
     from vslam_ref.plot.saving import Figure
 
 FILES = ("figure.svg", "figure.png", "result.json", "runs.npz")
@@ -27,7 +28,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time a zip file can state
 
 
 def document(
-    experiment: Experiment[Any], config: Any, result: Result, claims: Sequence[Claim], seconds: float
+    experiment: Experiment[Any], study: Study[Any], claims: Sequence[Claim], seconds: float, quick: bool
 ) -> dict[str, Any]:
     """Return the content of ``result.json``, keys in their written order."""
     check_distinct(claims)
@@ -35,15 +36,37 @@ def document(
         "experiment": experiment.id,
         "title": experiment.title,
         "source": experiment.source,
-        "seed": result.seed,
-        "runs": result.runs,
-        "config": config_to_dict(config),
-        "assumptions": assumptions(config, experiment.default()),
+        "seed": study.seed,
+        "runs": experiment.sample(study),
+        "quick": quick,
+        "config": config_to_dict(study.config),
+        "assumptions": assumptions(study.config, experiment.default()),
         "claims": [claim.to_dict() for claim in claims],
-        "series": result.series,
+        "series": experiment.series(study),
+        "arrays": described(experiment.arrays(study), experiment.about),
         "seconds": seconds,
         "versions": versions(),
     }
+
+
+def described(arrays: Mapping[str, NDArray[Any]], about: Mapping[str, str]) -> dict[str, str]:
+    """Return what each array of ``runs.npz`` is, by its key.
+
+    Raises
+    ------
+    ValueError
+        If nothing is said about an array.
+
+    Examples
+    --------
+    >>> described({"nees/ekf/low": np.zeros((50, 9))}, {"nees": "NEES of the pose, (runs, time)"})
+    {'nees/ekf/low': 'NEES of the pose, (runs, time); shape (50, 9)'}
+    """
+    first = {key: re.split(r"[/.]", key)[0] for key in arrays}
+    unknown = [key for key, word in first.items() if word not in about]
+    if unknown:
+        raise ValueError(f"'about' must say what these arrays are: {', '.join(unknown)}")
+    return {key: f"{about[first[key]]}; shape {np.shape(a)}" for key, a in arrays.items()}
 
 
 def write_folder(

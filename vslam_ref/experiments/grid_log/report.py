@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from vslam_ref.experiments.grid_log.mapping import Mapped
 from vslam_ref.grids.log_odds import LogOddsGrid
 from vslam_ref.plot.grids import log_figure
 from vslam_ref.plot.saving import figure_bytes
+from vslam_ref.support import pages
 from vslam_ref.support.json_text import to_json
 
 FILM = "animation.webm"
@@ -123,37 +123,26 @@ def _figure(mapped: Mapped, maps: Mapping[str, LogOddsGrid], window: tuple[slice
     )
 
 
-_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
-  color: #1b1b1b; background: #fff; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { border: 1px solid #c8c8c8; padding: .3rem .6rem; text-align: right; }
-th:first-child { text-align: left; } img, video { max-width: 100%; height: auto; }"""
-
-
 def _page(title: str, content: Mapping[str, Any], png: bytes, folder: Path) -> str:
-    """``report.html``: no script, no font, no request but for the film beside it."""
-    body = "\n".join(
-        f'<tr><th scope="row">{escape(words)}</th><td>{escape(value)}</td><td>{escape(unit)}</td></tr>'
-        for words, value, unit in number_rows(content)
-    )
-    film = ""
-    if (folder / FILM).exists():
-        film = (
-            f'<p><video src="{FILM}" controls muted loop playsinline></video><br>\n'
-            f'<a href="{FILM}">{FILM}</a>: S with D in red-orange and the ways of what '
-            "moved in light blue, the plain grid beside it, the robot in blue.</p>\n"
-        )
+    """``report.html``: numbers and maps in it, the film beside it."""
     data = base64.b64encode(png).decode("ascii")
-    links = " ".join(
-        f'<a href="{name}">{name}</a>'
-        for name in ("static.yaml", "dynamic.yaml", "plain.yaml", "maps.npz", "tracks.csv", "result.json")
+    names = ("static.yaml", "dynamic.yaml", "plain.yaml", "maps.npz", "tracks.csv", "result.json")
+    return pages.page(
+        title,
+        pages.table([], number_rows(content), caption="Numbers", kind="numbers"),
+        pages.image(f"data:image/png;base64,{data}", "Static map, plain grid, what moved"),
+        _film(folder / FILM),
+        pages.tag("p", pages.links({name: name for name in names}, " ")),
     )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f"<h1>{escape(title)}</h1>\n<table>\n<tbody>\n{body}\n</tbody>\n</table>\n"
-        f'<p><img src="data:image/png;base64,{data}" alt="Static map, plain grid, what moved"></p>\n'
-        f"{film}<p>{links}</p>\n</main>\n</body>\n</html>\n"
+
+
+def _film(path: Path) -> pages.Html | None:
+    """The film, if there is one."""
+    if not path.exists():
+        return None
+    words = (
+        ": S with D in red-orange and the ways of what moved in light blue, the plain grid beside it, the "
+        "robot in blue."
     )
+    film = pages.Html(f'<video src="{path.name}" controls muted loop playsinline></video><br>')
+    return pages.tag("p", film, pages.links({path.name: path.name}), words)

@@ -4,15 +4,17 @@
 module                        holds
 ============================  =====================================================================
 ``sentences``                 every statement of B 4.1 with its rule: the table fixed before the runs
-``rules``                     the vocabulary: windows, statistics of mean curves, sizes of effect words
+``measures``                  windows, and statistics of mean curves
+``rules``                     sizes of effect words, worlds in which a claim is false, the rule
 ``naive``                     the sentences read pointwise, reported beside the rules
 ``worlds``                    draws of runs, and worlds in which a claim is false
 ``evaluate``                  thresholds, shares, intervals and null rates of many claims in one pass
 ``judge``                     the verdict rule, and the door: per-run arrays in, claims out
-``study``, ``figures``        the Monte Carlo study, and what the experiments of the three figures share
-``grid``, ``sensitivity``     the settings of the sensitivity study, and one of them run and judged
+``study``, ``figures``        the Monte Carlo study; figures 2, 3 and 4
+``grid``, ``settings``        the settings of ``sensitivity``, and one of them run and judged
 ``grid_rules``                what the grid as a whole says
-``neighbours``                what the experiments on other public setups share
+``neighbours``                what ``circle`` and ``bailey``, on other public setups, share
+``errata``, ``reduced``       the misprints run as printed; the lifted filter and its reduction
 ============================  =====================================================================
 """
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.iekf import worlds
-from vslam_ref.experiments.iekf.rules import Rule, Scene
+from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import Sentence
 from vslam_ref.experiments.iekf.worlds import Pick, Series
 from vslam_ref.metrics import consistency
@@ -41,6 +42,8 @@ class Evaluation:
         95 % interval of the share over resampled populations.
     null_rate : float
         Share of studies of the null world in which the rule says yes.
+    population_runs, study_runs : int
+        Runs of the whole population, and of one study.
     """
 
     sentence: Sentence
@@ -53,6 +56,8 @@ class Evaluation:
     naive: NDArray[np.bool_] | None
     share_interval: tuple[float, float]
     null_rate: float
+    population_runs: int = 0
+    study_runs: int = 0
 
     @property
     def holds(self) -> NDArray[np.bool_]:
@@ -122,6 +127,8 @@ def evaluate_all(
                 naive=naive[s.id],
                 share_interval=consistency.percentile_interval(shares, LEVEL),
                 null_rate=float(np.mean(s.rule.holds(nulls[s.id].false, threshold))),
+                population_runs=len(next(iter(data.values()))),
+                study_runs=scene.runs,
             )
         )
     return evaluations

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vslam_ref.experiments.iekf.judge import CONTROL_STUDIES, POPULATION_STUDIES
-from vslam_ref.experiments.iekf.study import StudyConfig, quick
+from vslam_ref.experiments.iekf.study import QUICK as STUDY_QUICK
+from vslam_ref.experiments.iekf.study import StudyConfig
 
 BASELINE = "baseline"
 
@@ -140,14 +141,12 @@ def baseline_value(config: SensitivityConfig, axis: str) -> float:
     return float(getattr(config.study.field, axis))
 
 
-def quick_grid(config: SensitivityConfig) -> SensitivityConfig:
-    """Five settings of a few runs each, too few for any verdict: the statements become "not testable"."""
-    study = replace(quick(config.study), population=20, control_runs=40)
-    return replace(
-        config, study=study, sigma_v=(), sigma_phi=config.sigma_phi[:1], sigma_z=(), small_noises=(),
-        max_range=(), landmarks=(), heading_variance=config.heading_variance[-1:], layouts=config.layouts[:1],
-        draws=config.draws[:1],
-    )  # fmt: skip
+QUICK: dict[str, Any] = {f"study.{key}": value for key, value in STUDY_QUICK.items()} | {
+    "study.population": 20, "study.control_runs": 40, "sigma_v": (), "sigma_phi": (float(np.deg2rad(1.0)),),
+    "sigma_z": (), "small_noises": (), "max_range": (), "landmarks": (), "heading_variance": (0.1,),
+    "layouts": (1,), "draws": (1,),
+}  # fmt: skip
+"""Five settings of a few runs each, too few for any verdict: the statements become "not testable"."""
 
 
 def grid_with_runs(config: SensitivityConfig, runs: int) -> SensitivityConfig:

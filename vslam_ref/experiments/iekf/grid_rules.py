@@ -13,11 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.framework import Claim, verdict
+from vslam_ref.experiments.framework import Claim, judged
 from vslam_ref.experiments.iekf.grid import BASELINE, NUMERIC
+from vslam_ref.experiments.iekf.judge import LEAST_STUDY
 from vslam_ref.experiments.iekf.rules import APART
-from vslam_ref.experiments.iekf.sensitivity import Grid, Judged
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
+from vslam_ref.experiments.iekf.settings import Grid, Judged
 from vslam_ref.metrics.consistency import bootstrap_interval, percentile_interval, resample_weights
 
 GAP = (
@@ -64,17 +65,20 @@ def statement_claim(sentence: Sentence, grid: Grid) -> Claim:
         measured["reason"] = f"not reproduced at {len(lost)} of {len(tested)} settings: {', '.join(lost)}"
     nulls = [j.claims[sentence.id].null_rate for j, _ in tested]
     untestable = len(tested) < 2 or base.verdict == "not testable"
-    return Claim(
+    good = sum(v == "reproduced" for _, v in tested)
+    words = f"The statement is {base.verdict} at the baseline, and holds at {good} of {len(tested)} settings"
+    return judged(
         sentence.id,
         sentence.source,
         f"{sentence.text} [Here: at every setting of the grid.]",
         "reproduced by its own rule (thresholds from each setting's own control) at the baseline and at "
         "every setting where it can be tested; share: of these settings; null rate: the largest of a setting",
+        None if untestable else good == len(tested),
+        words + (f"; it fails at {', '.join(lost)}" if lost else ""),
         measured,
-        None,
-        max((n for n in nulls if n is not None), default=None),
-        sum(v == "reproduced" for _, v in tested) / len(tested) if tested else None,
-        verdict(None if untestable else all(v == "reproduced" for _, v in tested)),
+        null_rate=max((n for n in nulls if n is not None), default=None),
+        share=good / len(tested) if tested else None,
+        least_runs=LEAST_STUDY,
     )
 
 
@@ -130,43 +134,49 @@ def gap_everywhere(grid: Grid) -> Claim:
         for j, v in grid.verdicts(claim):
             tested += v != "not testable"
             failed += [f"{claim} at {j.setting.name}"] if v == "not reproduced" else []
-    return Claim(
+    return judged(
         "high-p0-gap-everywhere",
         SOURCE,
         "A high P0 harms the EKF, and the IEKF much less, at every setting of the grid",
         f"{', '.join(GAP)}: reproduced wherever they can be tested",
+        not failed if tested else None,
+        f"Of {tested} tests (five statements at every setting) {len(failed)} failed",
         {"tested": tested, "failed": failed},
-        None,
-        None,
-        1.0 - len(failed) / tested if tested else None,
-        verdict(not failed if tested else None),
+        share=1.0 - len(failed) / tested if tested else None,
+        least_runs=LEAST_STUDY,
     )
 
 
 def low_depends_on_layout(grid: Grid) -> Claim:
     """Layout decides what is seen of the EKF at low P0; another draw of the noises decides less."""
     measured: dict[str, object] = {}
-    judged = []
+    telling, spreads = [], []
     for claim in EKF_LOW:
         layouts, draws = (_spread(claim, axis, grid) for axis in ("layout", "draw"))
         if layouts is None or draws is None:
             continue
         changes = len({j.claims[claim].verdict for j in (grid.baseline, *grid.axis("layout"))}) > 1
+        spreads.append((claim, layouts, draws))
         measured[claim] = {"spread_layouts": layouts, "spread_draws": draws, "verdict_changes": changes}
-        judged.append(changes and layouts >= SPREAD and layouts >= 2.0 * draws)
-    if judged and not any(judged):
+        telling.append(changes and layouts >= SPREAD and layouts >= 2.0 * draws)
+    if telling and not any(telling):
         measured["reason"] = "no share moves far more from layout to layout than from draw to draw"
-    return Claim(
+    moved = "; ".join(
+        f"{claim}: {100 * layouts:.0f} points over the layouts, {100 * draws:.0f} over the draws"
+        for claim, layouts, draws in spreads
+    )
+    return judged(
         "ekf-low-depends-on-layout",
         SOURCE,
         "What B says of the EKF at low P0 depends on where the landmarks lie, not on the draw of the noises",
         f"for at least one of {', '.join(EKF_LOW)} the verdict changes over the layouts, the share varies by "
         f"at least {SPREAD:g} over them, and by at most half of that over the draws",
+        any(telling) if telling else None,
+        f"How far the share of studies that show B's picture moves, in percent, is for {moved}"
+        if moved
+        else "Layouts or draws were not run, or could not be judged",
         measured,
-        None,
-        None,
-        None,
-        verdict(any(judged) if judged else None),
+        least_runs=LEAST_STUDY,
     )
 
 
@@ -188,18 +198,20 @@ def anchored_not_worse(grid: Grid, rng: np.random.Generator) -> Claim:
         upper[j.setting.name] = bootstrap_interval(pair, lambda c: c[:, 0] / c[:, 1], rng)[1]
     worst = max(upper, key=lambda n: upper[n])
     few = len(grid.baseline.end["iekf/high"]) < 4 * grid.baseline.setting.study.runs
-    return Claim(
+    return judged(
         "anchored-not-worse",
         SOURCE,
         "At high P0 the anchored EKF, an ordinary EKF that keeps P0 away from the measurements, is at least "
         "as consistent as the IEKF after both loops, at every setting of the grid",
         f"NEES over 150-160 s, anchored EKF over IEKF: upper end of the 95 % whole-run interval <= {APART:g} "
         "at every setting",
+        None if few else all(u <= APART for u in upper.values()),
+        f"The anchored EKF's NEES over the IEKF's is at most {max(ratio.values()):.3g}; the interval's "
+        "upper end is "
+        f"largest, {upper[worst]:.3g}, at {worst}, and {APART:g} is allowed",
         {"largest_upper_end": [worst, upper[worst]], "largest_ratio": max(ratio.values())},
-        None,
-        None,
-        sum(u <= APART for u in upper.values()) / len(upper),
-        verdict(None if few else all(u <= APART for u in upper.values())),
+        share=sum(u <= APART for u in upper.values()) / len(upper),
+        least_runs=LEAST_STUDY,
     )
 
 
@@ -220,20 +232,23 @@ def rises_along(
     means = [float(j.end[key].mean()) for j in ordered]
     low, high = _ratio_interval(ordered[-1].end[key], ordered[0].end[key], rng)
     few = len(ordered) < 3 or len(grid.baseline.end[key]) < 4 * grid.baseline.setting.study.runs
-    return Claim(
+    steps = ", ".join(f"{m:.3g}" for m in means)
+    return judged(
         id,
         SOURCE,
         text,
         f"mean NEES of {key} over 150-160 s rises at each step of {axis}, and its ratio from the first to "
         "the last value has a 95 % whole-run interval above 1",
+        None if few else bool(np.all(np.diff(means) > 0)) and low > 1.0,
+        f"From the smallest to the largest value the mean NEES is {steps}; the last over the first lies "
+        "between "
+        f"{low:.3g} and {high:.3g} (95 %)",
         {
             "values": [j.setting.label if j.setting.axis != BASELINE else BASELINE for j in ordered],
             "nees": means,
         },
-        [low, high],
-        None,
-        None,
-        verdict(None if few else bool(np.all(np.diff(means) > 0)) and low > 1.0),
+        ci=[low, high],
+        least_runs=LEAST_STUDY,
     )
 
 
@@ -249,14 +264,17 @@ def small_noises_keep_gap(grid: Grid) -> Claim:
     tested = [c for c in claims if c.verdict != "not testable"]
     ends = [{key: float(j.end[f"{key}/high"].mean()) for key in ("ekf", "iekf", "ekf-anchored")}
             for j in grid.axis("small_noises")]  # fmt: skip
-    return Claim(
+    share = min((c.share for c in tested if c.share is not None), default=None)
+    return judged(
         "small-noises-keep-gap",
         SOURCE,
         "With all noises small the IEKF at high P0 is still much better than the EKF",
         f"iekf-high-much-better at small_noises: {SENTENCES['iekf-high-much-better'].rule.text()}",
+        all(c.verdict == "reproduced" for c in tested) if tested else None,
+        "No setting with small noises was run, or none could be tested" if share is None else
+        f"With small noises {share:.0%} of studies show the IEKF much better than the EKF",
         {"nees_end": ends},
-        None,
-        max((c.null_rate for c in tested if c.null_rate is not None), default=None),
-        min((c.share for c in tested if c.share is not None), default=None),
-        verdict(all(c.verdict == "reproduced" for c in tested) if tested else None),
-    )
+        null_rate=max((c.null_rate for c in tested if c.null_rate is not None), default=None),
+        share=share,
+        least_runs=LEAST_STUDY,
+    )  # fmt: skip

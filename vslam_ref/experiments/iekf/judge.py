@@ -12,7 +12,7 @@ One rule decides all claims.  It was fixed before the runs:
 
 **not testable** when no data could have met these: a series or the control is missing or has no value
 somewhere, the study ends before the second lap does, the population is smaller than four studies or the
-control than eight, or the null rate is above one half, so that not even a share of one would tell.
+control than eight, or the null rate is above one half, so that not even a share of one would decide.
 
 **not reproduced** otherwise.
 
@@ -27,9 +27,10 @@ from typing import TypedDict
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.framework import Claim, verdict
+from vslam_ref.experiments.framework import Claim, judged
 from vslam_ref.experiments.iekf.evaluate import Evaluation, evaluate_all
-from vslam_ref.experiments.iekf.rules import Rule, Scene
+from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
 from vslam_ref.experiments.iekf.worlds import control_names
 
@@ -41,6 +42,9 @@ TELLING = 0.5
 
 POPULATION_STUDIES, CONTROL_STUDIES = 4, 8
 """Least population and control, in studies: with fewer, drawn studies are mostly the same runs."""
+
+LEAST_STUDY = 50
+"""Runs of B's own study: claims on figures of 50 runs are judged on studies of 50 runs."""
 
 
 class StudyArrays(TypedDict):
@@ -127,9 +131,22 @@ def conclude(e: Evaluation) -> Claim:
         measured["reason"] = "the rule says yes too often where the claim is false"
     elif not all(conditions.values()):
         measured["reason"] = _why_not(e, conditions)
-    outcome = verdict(None if undecidable else all(conditions.values()))
-    ci = [float(end) for end in e.interval]
-    return Claim(s.id, s.source, s.text, rule.text(), measured, ci, e.null_rate, e.share, outcome)
+    return judged(
+        s.id, s.source, s.text, rule.text(), None if undecidable else all(conditions.values()),
+        _found(e, undecidable or (conditions["seen"] and not conditions["telling"])), measured,
+        ci=e.interval, null_rate=e.null_rate, share=e.share, runs=e.study_runs, least_runs=LEAST_STUDY,
+    )  # fmt: skip
+
+
+def _found(e: Evaluation, vague: bool) -> str:
+    """Say what was found: the statistic of all runs, its bound, and how many studies show it."""
+    rule = e.sentence.rule
+    size = "B's size" if e.study_runs == LEAST_STUDY else f"{e.study_runs} runs"
+    text = (
+        f"Over {e.population_runs} runs {rule.found(e.population)}; {rule.bound(e.threshold)}; "
+        f"{e.share:.0%} of studies of {size} show B's picture"
+    )
+    return text + (f", but so do {e.null_rate:.0%} where it is false" if vague else "")
 
 
 def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:
@@ -160,7 +177,10 @@ def all_at_once(evaluations: Sequence[Evaluation]) -> dict[str, float]:
 
 
 def _not_testable(s: Sentence, reason: str) -> Claim:
-    return Claim(s.id, s.source, s.text, s.rule.text(), {"reason": reason}, None, None, None, verdict(None))
+    found = f"Nothing can be said: {reason}"
+    return judged(
+        s.id, s.source, s.text, s.rule.text(), None, found, {"reason": reason}, least_runs=LEAST_STUDY
+    )
 
 
 def _series(study: StudyArrays, name: str) -> Array | None:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.experiments.iekf.rules import BRIEF, Curves, Measure, Reading, Scene, WindowName, phrase
+from vslam_ref.experiments.iekf.measures import Curves, Measure, Scene, WindowName, phrase
+from vslam_ref.experiments.iekf.rules import BRIEF, Reading
 from vslam_ref.metrics import consistency
 
 

@@ -2,7 +2,7 @@
 
 ::
 
-    Drive (increments, sightings, truth) --follow--> Errors per run --common_claims--> verdicts
+    Drive (increments, sightings) --errors_of--> Errors per run --common_claims--> verdicts
 
 The starts are ``zero``, P0 = 0 as published, and ``high``, the high P0 of seed B.  At ``zero`` the anchored
 EKF *is* the EKF: what either study shows there, P0 cannot explain.
@@ -10,20 +10,20 @@ EKF *is* the EKF: what either study shows there, P0 cannot explain.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.arrays import Array, IntArray
-from vslam_ref.experiments.framework import Claim, verdict
+from vslam_ref.arrays import Array
+from vslam_ref.experiments.framework import Claim, judged
 from vslam_ref.experiments.iekf.rules import APART, MARKED, MUCH
 from vslam_ref.filters.carleman_ekf import ReducedCarlemanEkf, carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import SlamFilter
-from vslam_ref.filters.vehicle import Increment
 from vslam_ref.metrics.consistency import bootstrap_interval, nees, pose_error
+from vslam_ref.worlds.drive import Drive, follow
 
 FILTERS = ("ekf", "iekf", "ekf-anchored")
 STARTS = ("zero", "high")
@@ -31,21 +31,10 @@ SETTLE = 10
 """Records at the start without a NEES: from P0 = 0 the covariance of the first is singular."""
 LONGER = 1.01
 """A heading vector this long makes the IEKF predict steps 1 % too long; at B's setting it ends at 1.02."""
+LEAST_RUNS = 50
+"""Runs that a question asks for: B's number."""
 SAME = 1e-9
 """Metres and radians; two filters that differ by less are one."""
-
-
-class Drive(NamedTuple):
-    """What B runs of a filter are fed, and the truth (T + 1, 3).
-
-    ``increments`` (B, T), (B, T), (B, T, 2, 2); ``seen``: step -> ids (m,), z (B, m, 2), cov_z; every
-    ``every``-th pose is recorded.
-    """
-
-    increments: Increment
-    seen: Mapping[int, tuple[IntArray, Array, Array]]
-    truth: Array
-    every: int
 
 
 class Errors(NamedTuple):
@@ -70,30 +59,23 @@ def make_filter(name: str, mean: Array, cov: Array, capacity: int) -> SlamFilter
     return AnchoredEkf(mean, cov, capacity) if name == "ekf-anchored" else EkfSlam(mean, cov, capacity)
 
 
-def follow(slam: SlamFilter, drive: Drive) -> Errors:
-    """Take a filter along a drive and keep its errors."""
-    ds, dalpha, cov_u = drive.increments
-    T = ds.shape[1]
+def errors_of(slam: SlamFilter, drive: Drive, truth: Array, every: int = 1) -> Errors:
+    """Take a filter along a drive and keep the errors of every so many poses; ``truth`` is (T + 1, 3)."""
     means, covs, lengths = [], [], []
-    for k in range(T + 1):
-        if k:
-            slam.predict(Increment(ds[:, k - 1], dalpha[:, k - 1], cov_u[:, k - 1]))
-        if k in drive.seen:
-            slam.update(*drive.seen[k])
-        if k % drive.every == 0:
-            mean, cov = slam.pose()
-            means.append(mean)
-            covs.append(cov)
-            lengths.append(_stretch(slam))
-    error = pose_error(drive.truth[: T + 1 : drive.every, None], np.array(means))
+    for step in follow(slam, drive, every):
+        means.append(step.mean)
+        covs.append(step.cov)
+        lengths.append(_stretch(slam, len(step.mean)))
+    T = drive.increments.ds.shape[1]
+    error = pose_error(truth[: T + 1 : every, None], np.array(means))
     return _errors(error, np.array(covs), np.array(lengths))
 
 
-def _stretch(slam: SlamFilter) -> Array:
-    """Length (B,) of the heading vector."""
+def _stretch(slam: SlamFilter, runs: int) -> Array:
+    """Length (runs,) of the heading vector."""
     if isinstance(slam, ReducedCarlemanEkf):
         return np.hypot(slam.blocks.x_p[:, 2], slam.blocks.x_p[:, 3])
-    return np.ones(len(slam.pose().mean))
+    return np.ones(runs)
 
 
 def _errors(error: Array, cov: Array, stretch: Array) -> Errors:
@@ -108,26 +90,33 @@ def _errors(error: Array, cov: Array, stretch: Array) -> Errors:
     return Errors(error[..., 2].T.copy(), position.T.copy(), stretch=stretch.T.copy(), **squares)
 
 
-def join(parts: list[Errors]) -> Errors:
-    """Put batches of runs together."""
-    return Errors(*map(np.concatenate, zip(*parts, strict=True)))
+def points(config: object) -> list[tuple[str, str]]:
+    """Every filter from every start."""
+    return [(name, start) for start in STARTS for name in FILTERS]
 
 
-def collect(names: Sequence[str], batches: Sequence[Errors]) -> dict[str, Errors]:
-    """Join the batches of equal name, ``filter/start``, in the order in which they come."""
-    parts: dict[str, list[Errors]] = {}
-    for name, batch in zip(names, batches, strict=True):
-        parts.setdefault(name, []).append(batch)
-    return {name: join(part) for name, part in parts.items()}
+def initial(config: object, start: str) -> Array:
+    """Variances (3,) of a start pose."""
+    return np.array(config.p0_high if start == "high" else (0.0, 0.0, 0.0))  # type: ignore[attr-defined]
 
 
-def per_run_arrays(errors: Mapping[str, Errors]) -> dict[str, NDArray[np.float32]]:
-    """Return the per-run curves for ``runs.npz``, in single precision."""
-    return {
+ABOUT = {
+    "heading": "heading error, radians, by filter and start; (runs, times)",
+    "position": "position error, metres, by filter and start; (runs, times)",
+    "nees": "NEES of the pose per degree of freedom, NaN at the start, by filter and start; (runs, times)",
+    "time": "seconds from the start; (times,)",
+}
+"""What ``runs.npz`` holds."""
+
+
+def arrays(time: Array, errors: Mapping[str, Errors]) -> dict[str, NDArray[np.floating]]:
+    """Return the per-run curves for ``runs.npz``, in single precision, and the times."""
+    curves = {
         f"{kind}/{name}": getattr(e, kind).astype(np.float32)
         for name, e in errors.items()
         for kind in ("heading", "position", "nees")
     }
+    return {**curves, "time": time}
 
 
 def rmse(error: Array) -> float:
@@ -230,8 +219,8 @@ def common_claims(
     rng : Generator
         For intervals over whole runs.
     """
-    judged = [answer(q, source, errors, enough, rng) for q in QUESTIONS]
-    return [*judged, anchored_is_ekf(source, errors)]
+    answers = [answer(q, source, errors, enough, rng) for q in QUESTIONS]
+    return [*answers, anchored_is_ekf(source, errors)]
 
 
 def answer(
@@ -246,27 +235,47 @@ def answer(
     if "iekf" in f"{q.first} {q.second}" and q.quantity == "nees":
         start = q.first.partition("/")[2]
         measured["iekf_heading_vector"] = float(last(errors[f"iekf/{start}"].stretch).mean())
+    side = ">" if q.above else "<="
     if not enough:
         measured["reason"] = "too few runs, or too short a course"
     elif not holds:
-        side = ">" if q.above else "<="
         measured["reason"] = f"the interval is [{low:.4g}, {high:.4g}], not all of it {side} {q.bound:g}"
-    outcome = verdict(holds if enough else None)
-    return Claim(q.id, source, q.text, q.rule(), measured, [low, high], None, None, outcome)
+    return judged(
+        q.id, source, q.text, q.rule(), holds if enough else None, _found(q, measured["value"], low, high),
+        measured,
+        ci=[low, high], least_runs=LEAST_RUNS,
+    )  # fmt: skip
+
+
+def _found(q: Question, value: object, low: float, high: float) -> str:
+    """Say what was found."""
+    names = {"nees": "NEES per degree of freedom", "stretch": "length of the heading vector"}
+    who = _called(q.first) + (f" over that of the {_called(q.second)}" if q.second else "")
+    bound = f"more than {q.bound:g}" if q.above else f"at most {q.bound:g}"
+    return (
+        f"Over the last tenth of the course the {names[q.quantity]} of the {who} is {value:.3g} (95 %: "
+        f"{low:.3g} to "
+        f"{high:.3g}); the rule asks for {bound}"
+    )
+
+
+def _called(key: str) -> str:
+    """Return a series in words."""
+    name, _, start = key.partition("/")
+    who = {"ekf": "EKF", "iekf": "IEKF", "ekf-anchored": "anchored EKF"}[name]
+    return f"{who} ({'start known' if start == 'zero' else 'high P0'})"
 
 
 def anchored_is_ekf(source: str, errors: Mapping[str, Errors]) -> Claim:
     """With nothing to keep apart, the anchored EKF has no effect."""
     a, b = errors["ekf-anchored/zero"], errors["ekf/zero"]
     gap = float(max(np.abs(a.heading - b.heading).max(), np.abs(a.position - b.position).max()))
-    return Claim(
+    return judged(
         "zero-anchored-is-ekf",
         source,
         "With a known start the anchored EKF is the EKF",
         f"largest difference of heading and position errors over all runs and times <= {SAME:g}",
+        gap <= SAME,
+        f"The two filters' errors differ by at most {gap:.1e} m or rad, and {SAME:g} is allowed for rounding",
         {"largest": gap},
-        None,
-        None,
-        None,
-        verdict(gap <= SAME),
     )

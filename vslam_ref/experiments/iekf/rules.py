@@ -1,27 +1,16 @@
-"""The vocabulary of the rules: time windows, statistics of mean curves, worlds in which a claim is false.
-
-A statistic maps the mean curves of draws of runs, one array (S, T) per role, to one number per draw.
-It knows the curves and the clock, nothing else; so the same function judges B's own runs, the whole
-population, subsets of it, and a world made up to fool it.
-"""
+"""The rule of a statement: sizes of effect words, and the worlds in which a claim is false."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
-from vslam_ref.metrics import consistency
-
-Curves = tuple[Array, ...]
-
-DOF = 3
-"""Degrees of freedom of a pose."""
+from vslam_ref.experiments.iekf.measures import Curves, Measure, Scene
 
 MARKED = 1.197
 """A growth is marked when it takes a consistent filter's expected NEES, 3, up to B's line, 3.592."""
@@ -35,79 +24,18 @@ MUCH = 2.0
 BRIEF = 0.25
 """A short time is at most a quarter of the lap, 20 s."""
 
-WindowName = Literal["lap 1", "lap 2", "both laps", "before closure", "after closure", "closure", "end"]
-PHRASES: dict[WindowName, str] = {
-    "before closure": "60-70 s",
-    "after closure": "80-90 s",
-    "closure": "75-85 s",
-    "end": "150-160 s",
-}
-"""Windows in words, at B's clock; the laps are called by their names."""
-
 NullName = Literal["consistent", "inflated", "grown", "swapped", "scaled"]
 
 
-def phrase(*names: WindowName) -> str:
-    """Windows in words."""
-    return " and ".join(PHRASES.get(name, name) for name in names)
+def subject(series: str) -> str:
+    """Return a series in words.
 
-
-@dataclass(frozen=True)
-class Scene:
-    """The clock of a study, and what follows from the number of runs.
-
-    Attributes
-    ----------
-    time : ndarray, shape (T,)
-        Seconds from the start.
-    lap_seconds : float
-        Duration of one lap; the loop closes then.
-    runs : int
-        Runs of one study (B: 50).
+    >>> subject("nees:ekf/low"), subject("error:iekf/high")
+    ("the EKF's NEES with low P0", "the IEKF's position error with high P0")
     """
-
-    time: Array
-    lap_seconds: float
-    runs: int
-
-    @cached_property
-    def line(self) -> float:
-        """One-sided 95 % line of the mean NEES at one time; 3.592 for 50 runs."""
-        return consistency.mean_line(self.runs, DOF)
-
-    @cached_property
-    def inflation(self) -> float:
-        """Factor on the NEES that a test at one time finds with power 0.8; 1.328 for 50 runs."""
-        return consistency.detectable_inflation(self.runs, DOF)
-
-    def window(self, name: WindowName) -> NDArray[np.bool_]:
-        """Time points of a window; "near" is an eighth of a lap, 10 s in B."""
-        t, lap, near = self.time, self.lap_seconds, self.lap_seconds / 8.0
-        start, stop = {
-            "lap 1": (0.0, lap),
-            "lap 2": (lap, 2 * lap),
-            "both laps": (0.0, 2 * lap),
-            "before closure": (lap - 2 * near, lap - near),
-            "after closure": (lap, lap + near),
-            "closure": (lap - near / 2, lap + near / 2),
-            "end": (2 * lap - near, 2 * lap),
-        }[name]
-        slack = lap * 1e-9  # times are multiples of 0.1 s with rounding
-        upto = t <= stop + slack if stop == 2 * lap else t < stop - slack
-        return (t >= start - slack) & upto
-
-    def average(self, curve: Array, name: WindowName) -> Array:
-        """Time average of each curve (S, T) in a window, (S,)."""
-        return consistency.window_mean(curve, self.window(name))
-
-
-@dataclass(frozen=True)
-class Measure:
-    """A statistic of mean curves: what it is in words, the function, and its window where it has one."""
-
-    says: str
-    compute: Callable[[Curves, Scene], Array]
-    window: WindowName | None = None
+    quantity, _, name = series.partition(":")
+    who, _, p0 = name.partition("/")
+    return f"the {who.upper()}'s {'NEES' if quantity == 'nees' else 'position error'} with {p0} P0"
 
 
 @dataclass(frozen=True)
@@ -116,111 +44,6 @@ class Reading:
 
     says: str
     holds: Callable[[Curves, Scene], NDArray[np.bool_]]
-
-
-def average(name: WindowName) -> Measure:
-    """Time average of the curve in a window."""
-    return Measure(f"time average over {phrase(name)}", lambda c, s: s.average(c[0], name))
-
-
-def maximum(name: WindowName) -> Measure:
-    """Largest value of the curve in a window."""
-    return Measure(
-        f"maximum over {phrase(name)}", lambda c, s: consistency.time_maximum(c[0], s.window(name))
-    )
-
-
-def share_above_line(name: WindowName) -> Measure:
-    """Share of a window's time in which the curve lies above B's line."""
-    return Measure(
-        f"share of {phrase(name)} above the line 3.592",
-        lambda c, s: consistency.fraction_above(c[0], s.line, s.window(name)),
-    )
-
-
-def least_average(*names: WindowName) -> Measure:
-    """Smallest time average over the windows and the series."""
-    return Measure(
-        f"smallest of the time averages over {phrase(*names)}",
-        lambda c, s: np.minimum.reduce([s.average(curve, n) for curve in c for n in names]),
-    )
-
-
-def greatest_average(*names: WindowName) -> Measure:
-    """Largest time average over the windows and the series."""
-    return Measure(
-        f"largest of the time averages over {phrase(*names)}",
-        lambda c, s: np.maximum.reduce([s.average(curve, n) for curve in c for n in names]),
-    )
-
-
-def ratio(name: WindowName) -> Measure:
-    """First series over second, time averages in a window."""
-    return Measure(
-        f"ratio of the time averages over {phrase(name)}, first to second,",
-        lambda c, s: s.average(c[0], name) / s.average(c[1], name),
-    )
-
-
-def difference_factor(name: WindowName) -> Measure:
-    """Factor between two series, whichever is larger."""
-
-    def compute(c: Curves, s: Scene) -> Array:
-        r = s.average(c[0], name) / s.average(c[1], name)
-        return np.maximum(r, 1.0 / r)
-
-    return Measure(f"factor between the time averages over {phrase(name)}, larger to smaller,", compute, name)
-
-
-def growth_at_closure() -> Measure:
-    """Mean of the 10 s after the lap ends, over 60-70 s.
-
-    With a range of 6 m the first landmarks come back into view some 6 s before the lap ends; the 10 s
-    between the windows are left out because the loop closes somewhere in them.
-    """
-    return Measure(
-        f"time average over {phrase('after closure')} divided by that over {phrase('before closure')}",
-        lambda c, s: s.average(c[0], "after closure") / s.average(c[0], "before closure"),
-    )
-
-
-def _rise(curve: Array, s: Scene) -> Array:
-    return s.average(curve, "end") - s.average(curve, "after closure")
-
-
-def rise_in_lap_2() -> Measure:
-    """Last 10 s of lap 2 less its first 10 s."""
-    return Measure(
-        "rise in lap 2, time average over 150-160 s less that over 80-90 s,", lambda c, s: _rise(c[0], s)
-    )
-
-
-def rise_difference() -> Measure:
-    """Rise of the first series in lap 2 less that of the second."""
-    return Measure(
-        "difference of the rises in lap 2 (150-160 s less 80-90 s), first less second,",
-        lambda c, s: _rise(c[0], s) - _rise(c[1], s),
-    )
-
-
-def ratio_of_ratios(name: WindowName) -> Measure:
-    """(first / second) / (third / fourth), time averages in a window."""
-
-    def compute(c: Curves, s: Scene) -> Array:
-        a, b, p, q = (s.average(curve, name) for curve in c)
-        return (a / b) / (p / q)
-
-    return Measure(f"first/second divided by third/fourth, time averages over {phrase(name)},", compute)
-
-
-def least_ratio(name: WindowName) -> Measure:
-    """Smaller of first/third and second/fourth."""
-
-    def compute(c: Curves, s: Scene) -> Array:
-        a, b, p, q = (s.average(curve, name) for curve in c)
-        return np.minimum(a / p, b / q)
-
-    return Measure(f"smaller of first/third and second/fourth, time averages over {phrase(name)},", compute)
 
 
 @dataclass(frozen=True)
@@ -281,6 +104,20 @@ class Rule:
         """Whether the consistent control is used."""
         calm = self.calibrated and self.null != "swapped"
         return calm or self.null in ("consistent", "inflated", "grown")
+
+    def found(self, value: float) -> str:
+        """Return in words that the statistic has a value."""
+        names = [subject(name) for name in self.series]
+        return self.measure.found.format(*names, v=value, all=" and ".join(names))
+
+    def bound(self, threshold: float) -> str:
+        """Return in words what the threshold stands for."""
+        if self.effect == threshold or not self.calibrated:
+            word = "at least" if self.above else "at most"
+            return f"the rule asks for {word} {threshold:.3g}"
+        if self.null == "swapped":
+            return f"with two filters that are alike it would stay under {threshold:.3g} in 95 % of studies"
+        return f"a consistent filter would stay under {threshold:.3g} in 95 % of studies"
 
     def text(self) -> str:
         """Return the rule in words."""

@@ -1,77 +1,87 @@
-"""One setting of the grid, run and judged; and all of them together."""
+"""Where the statements of B 4.1 hold, and where they stop: a map over the settings that B leaves open.
+
+The baseline is the study of figures 2-4.  One setting at a time is changed: noises, range, number and layout
+of the landmarks, the heading's initial variance; two columns change nothing but the draw of the noises, so
+that the map shows what chance does.  At every setting all statements are judged by their own rules, with
+thresholds and null rates from that setting's own consistent control.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.framework import Claim, Verdict
-from vslam_ref.experiments.iekf.figures import study_arrays
-from vslam_ref.experiments.iekf.grid import BASELINE, Setting
-from vslam_ref.experiments.iekf.judge import judge
-from vslam_ref.experiments.iekf.rules import Scene
-from vslam_ref.experiments.iekf.sentences import claim_ids
-from vslam_ref.experiments.iekf.study import run_study
+from vslam_ref.experiments.framework import Claim, Experiment, Study
+from vslam_ref.experiments.iekf.grid import (
+    AXES,
+    NUMERIC,
+    QUICK,
+    SensitivityConfig,
+    baseline_value,
+    grid_with_runs,
+    settings_of,
+)
+from vslam_ref.experiments.iekf.grid_rules import mechanism_claims, statement_claim
+from vslam_ref.experiments.iekf.sentences import SENTENCES
+from vslam_ref.experiments.iekf.settings import Grid, Verdicts, grid_of, map_series, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Map = Study[dict[str, Verdicts]]
 
 
-class Judged(NamedTuple):
-    """A setting with its verdicts: claims by id; NEES of each run, averaged over 150-160 s, by filter/p0."""
-
-    setting: Setting
-    claims: dict[str, Claim]
-    end: dict[str, Array]
-
-
-class Grid(NamedTuple):
-    """All settings, the baseline first."""
-
-    judged: tuple[Judged, ...]
-
-    @property
-    def baseline(self) -> Judged:
-        """The setting of figures 2-4."""
-        return self.judged[0]
-
-    def axis(self, name: str) -> list[Judged]:
-        """Settings of an axis, by value, without the baseline."""
-        return sorted((j for j in self.judged if j.setting.axis == name), key=lambda j: j.setting.value)
-
-    def axes(self) -> list[str]:
-        """Axes that have settings, in order, without the baseline."""
-        return [a for a in dict.fromkeys(j.setting.axis for j in self.judged) if a != BASELINE]
-
-    def verdicts(self, claim: str) -> Iterator[tuple[Judged, Verdict]]:
-        """Verdict on one claim at every setting."""
-        return ((j, j.claims[claim].verdict) for j in self.judged)
-
-
-def judge_setting(setting: Setting) -> Judged:
-    """Run a setting's study and its own consistent control, and judge all statements of B 4.1.
-
-    The per-run curves of a setting, some 80 MB, stay in the process that made them.  Each figure draws
-    from the generator that ``iekf-fig2`` to ``iekf-fig4`` use.
-    """
-    study = run_study(setting.study)
-    arrays = study_arrays(study)
-    claims: dict[str, Claim] = {}
-    for figure in (2, 3, 4):
-        rng = np.random.default_rng([setting.study.seed, figure])
-        claims |= {c.id: c for c in judge(arrays, claim_ids(figure), rng)}
-    scene = Scene(study.time, setting.study.field.lap_seconds, setting.study.runs)
-    kept = {key: x for key, x in study.nees.items() if not key.startswith("control")}
-    return Judged(setting, claims, {key: scene.average(x, "end") for key, x in kept.items()})
-
-
-def map_series(grid: Sequence[Judged]) -> dict[str, object]:
-    """Collect what is drawn: per setting (columns) and claim, share and verdict; mean NEES at the end."""
-    first = grid[0]
+def arrays(study: Map) -> dict[str, Array]:
+    """One number per run: its NEES averaged over 150-160 s."""
     return {
-        "axis": [j.setting.axis for j in grid],
-        "value": [j.setting.label for j in grid],
-        "verdict": {i: [j.claims[i].verdict for j in grid] for i in first.claims},
-        "share": {i: [j.claims[i].share for j in grid] for i in first.claims},
-        "nees_end": {key: [float(j.end[key].mean()) for j in grid] for key in first.end},
+        f"nees_end/{j.setting.name}/{key}": values
+        for j in grid_of(study).judged
+        for key, values in j.end.items()
     }
+
+
+def claims(study: Map) -> list[Claim]:
+    """Judge the mechanisms, then each statement over the whole grid."""
+    grid = grid_of(study)
+    baseline_at = {axis: baseline_value(study.config, axis) for axis in NUMERIC}
+    return [
+        *mechanism_claims(grid, baseline_at, study.rng(5)),
+        *(statement_claim(s, grid) for s in SENTENCES.values()),
+    ]
+
+
+def draw(grid: Grid) -> Figure:
+    """Draw the map."""
+    from vslam_ref.plot.sensitivity import VerdictMap, map_figure
+
+    base = grid.baseline.setting.study
+    return map_figure(
+        VerdictMap(
+            rows=[(f"figure {s.figure}", s.id) for s in SENTENCES.values()],
+            columns=[(AXES[j.setting.axis], j.setting.label) for j in grid.judged],
+            verdict=[[j.claims[i].verdict for j in grid.judged] for i in SENTENCES],
+            share=[[j.claims[i].share for j in grid.judged] for i in SENTENCES],
+        ),
+        {key: [float(j.end[key].mean()) for j in grid.judged] for key in grid.baseline.end},
+        runs=base.runs,
+        population=base.population,
+    )
+
+
+EXPERIMENT = Experiment(
+    id="iekf-sensitivity",
+    title="Where the claims of figures 2-4 hold and where they stop",
+    source="B 4.1; settings that B leaves open",
+    config_type=SensitivityConfig,
+    simulate=simulate,
+    points=settings_of,
+    name=lambda setting: setting.name,
+    seeds=lambda config, setting: [None],
+    series=lambda study: map_series(grid_of(study).judged),
+    arrays=arrays,
+    claims=claims,
+    figure=lambda study: draw(grid_of(study)),
+    about={"nees_end": "NEES averaged over 150-160 s, by setting, filter and initial uncertainty; (runs,)"},
+    quick=QUICK,
+    with_runs=grid_with_runs,
+)

@@ -2,8 +2,7 @@
 
 ::
 
-    StudyConfig --> tasks (filter, P0, batch of runs) --> simulate --> StudyResult
-                                                                         nees, errors: (runs, T + 1)
+    StudyConfig --> points (filter, P0) x batches of runs --simulate--> nees, errors: (runs, T + 1)
 
 All filters and both P0 see the same noises, run by run.  Run r draws from its own child of one
 SeedSequence, and the size of a batch is part of the config, so the arrays are the same bytes for any
@@ -17,20 +16,29 @@ noises is then exactly consistent, and its NEES has the correlation in time of t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.filters import vehicle
+from vslam_ref.experiments.framework import Study, batches
+from vslam_ref.experiments.framework.driver import Unit, carry_out, gather, plan
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.metrics.consistency import nees_pose, nis, pose_error
-from vslam_ref.worlds.vehicle_field import Noise, VehicleField, VehicleFieldConfig, draw_noise, make_field
+from vslam_ref.worlds.drive import field_drive, follow
+from vslam_ref.worlds.vehicle_field import (
+    Course,
+    Noise,
+    VehicleField,
+    VehicleFieldConfig,
+    draw_noise,
+    make_field,
+)
 
 FILTERS = ("ekf", "iekf", "ekf-anchored", "ekf-ideal")
 
@@ -101,16 +109,6 @@ class StudyConfig:
         return np.array(self.p0_low if name == "low" else self.p0_high)
 
 
-class Task(NamedTuple):
-    """One batch of runs of one filter: what a worker is sent."""
-
-    config: StudyConfig
-    filter: str
-    p0: str
-    first: int
-    size: int
-
-
 class RunArrays(NamedTuple):
     """Per run: NEES, position error [m] and heading error [rad] (M, T + 1); NIS per number (M, K)."""
 
@@ -131,15 +129,6 @@ class StudyResult(NamedTuple):
     nis: dict[str, Array]
 
 
-class Mapper(Protocol):
-    """How tasks are carried out: the experiment framework's ``RunContext`` is one."""
-
-    def map(
-        self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = ""
-    ) -> list[RunArrays]:
-        """Results in the order of the tasks."""
-
-
 @lru_cache(maxsize=4)
 def study_field(config: StudyConfig) -> VehicleField:
     """The world of a study; its landmarks come from the first child of the seed, or of ``layout``."""
@@ -147,11 +136,19 @@ def study_field(config: StudyConfig) -> VehicleField:
     return make_field(config.field, np.random.default_rng(root.spawn(3)[0]))
 
 
+def run_seeds(config: StudyConfig, control: bool, count: int) -> list[np.random.SeedSequence]:
+    """One seed per run; the control has runs of its own."""
+    return np.random.SeedSequence(config.seed).spawn(3)[2 if control else 1].spawn(count)
+
+
+def noises(world: Course, seeds: Sequence[np.random.SeedSequence]) -> Noise:
+    """Noises of some runs, each from its own seed."""
+    return draw_noise(world, [np.random.default_rng(seed) for seed in seeds])
+
+
 def run_noise(config: StudyConfig, control: bool, first: int, count: int) -> Noise:
-    """Noises of runs ``first`` to ``first + count``; the control has runs of its own."""
-    root = np.random.SeedSequence(config.seed).spawn(3)[2 if control else 1]
-    children = root.spawn(first + count)[first:]
-    return draw_noise(study_field(config), [np.random.default_rng(child) for child in children])
+    """Noises of runs ``first`` to ``first + count``."""
+    return noises(study_field(config), run_seeds(config, control, first + count)[first:])
 
 
 def make_filter(name: str, mean: Array, cov: Array, config: StudyConfig, world: VehicleField) -> SlamFilter:
@@ -166,92 +163,58 @@ def make_filter(name: str, mean: Array, cov: Array, config: StudyConfig, world: 
     return EkfSlam(mean, cov, n)
 
 
-def simulate(task: Task) -> RunArrays:
-    """Run one filter over one batch of runs."""
-    config, control = task.config, task.filter == "control"
+def points(config: StudyConfig) -> list[tuple[str, str]]:
+    """Filters, and the control if it is asked for, each with both P0."""
+    names = [*config.filters, *(["control"] if config.control_runs else [])]
+    return [(name, p0) for name in names for p0 in ("low", "high")]
+
+
+def seeds(config: StudyConfig, point: tuple[str, str]) -> list[Unit]:
+    """Batches of a fixed size, the same runs for every filter."""
+    control = point[0] == "control"
+    return batches(
+        run_seeds(config, control, config.control_runs if control else config.population), config.batch
+    )
+
+
+def simulate(
+    config: StudyConfig, point: tuple[str, str], seeds: tuple[np.random.SeedSequence, ...]
+) -> RunArrays:
+    """Run one filter from one P0 over one batch of runs."""
+    name, control = point[0], point[0] == "control"
     world = study_field(config)
-    noise = run_noise(config, control, task.first, task.size)
+    noise = noises(world, seeds)
     scale = config.control_scale if control else 1.0
-    p0 = config.p0(task.p0) * scale**2
+    p0 = config.p0(point[1]) * scale**2
     start = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
-    slam = make_filter("ekf" if control else task.filter, start, np.diag(p0), config, world)
-    return drive(slam, world, noise, scale)
+    slam = make_filter("ekf" if control else name, start, np.diag(p0), config, world)
+    return errors_of(slam, world, noise, scale)
 
 
-def drive(slam: SlamFilter, world: VehicleField, noise: Noise, scale: float = 1.0) -> RunArrays:
-    """Take a filter through the whole course and keep its errors.
-
-    Parameters
-    ----------
-    slam : SlamFilter
-        Started for B runs.
-    world : VehicleField
-    noise : Noise
-        Standard normal draws of the B runs.
-    scale : float
-        Factor on all standard deviations (the control's).
-    """
-    c = world.config
-    controls = world.controls + noise.controls * scale * np.array([c.sigma_v, c.sigma_phi])
-    cov_u, cov_z = c.cov_u * scale**2, c.cov_z * scale**2
-    seen = {s.step: (s, e) for s, e in zip(world.sightings, noise.sightings, strict=True)}
-    B, T = controls.shape[:2]
-    mean, cov = np.empty((T + 1, B, 3)), np.empty((T + 1, B, 3, 3))
-    innovations = []
-    for k in range(T + 1):
-        if k:
-            slam.predict(vehicle.ackermann_increment(controls[:, k - 1], cov_u, c.wheelbase, c.dt))
-        if k in seen:
-            sighting, e = seen[k]
-            innovation = slam.update(sighting.ids, sighting.z + scale * c.sigma_z * e, cov_z)
-            if innovation is not None:
-                value = nis(*innovation).value / innovation.innovation.shape[1]
-                innovations.append(value)
-        mean[k], cov[k] = slam.pose()
+def errors_of(slam: SlamFilter, world: VehicleField, noise: Noise, scale: float = 1.0) -> RunArrays:
+    """Take a filter, started for B runs, through the whole course and keep its errors."""
+    steps = list(follow(slam, field_drive(world, noise, scale)))
+    mean, cov = np.array([s.mean for s in steps]), np.array([s.cov for s in steps])
     error = pose_error(world.T_world_vehicle[:, None], mean)
     square = nees_pose(np.broadcast_to(world.T_world_vehicle[:, None], mean.shape), mean, cov).value
     position = np.hypot(error[..., 0], error[..., 1])
-    return RunArrays(square.T.copy(), position.T.copy(), error[..., 2].T.copy(), np.array(innovations).T)
+    updates = [s.innovation for s in steps if s.innovation is not None]
+    per_number = np.array([nis(*u).value / u.innovation.shape[1] for u in updates])
+    return RunArrays(square.T.copy(), position.T.copy(), error[..., 2].T.copy(), per_number.T)
 
 
-def tasks_of(config: StudyConfig) -> list[Task]:
-    """All batches of a study, in a fixed order."""
-    wanted = [(name, config.population) for name in config.filters]
-    wanted += [("control", config.control_runs)] if config.control_runs else []
-    return [
-        Task(config, name, p0, first, min(config.batch, total - first))
-        for name, total in wanted
-        for p0 in ("low", "high")
-        for first in range(0, total, config.batch)
-    ]
+def columns(study: Study[dict[str, RunArrays]]) -> StudyResult:
+    """Sort the arrays of a study by what they are."""
+    by_name = {name: {k: getattr(r, name) for k, r in study.data.items()} for name in RunArrays._fields}
+    return StudyResult(study.config, study_field(study.config).times, **by_name)
 
 
-class _InProcess:
-    def map(
-        self, function: Callable[[Task], RunArrays], batches: list[Task], label: str = ""
-    ) -> list[RunArrays]:
-        return [function(task) for task in batches]
+def run_study(config: StudyConfig) -> StudyResult:
+    """Run the whole study in this process."""
+    work = plan(simulate, config, points(config), seeds)
+    done = [carry_out(task) for task in work.tasks]
+    return columns(Study(config, gather(work, done, points(config), "/".join)))
 
 
-def run_study(config: StudyConfig, mapper: Mapper | None = None) -> StudyResult:
-    """Run the whole study.
-
-    Parameters
-    ----------
-    config : StudyConfig
-    mapper : Mapper, optional
-        Carries the tasks out; in this process when left out.
-    """
-    tasks = tasks_of(config)
-    done = (mapper or _InProcess()).map(simulate, tasks, "Monte Carlo runs")
-    arrays: dict[str, list[RunArrays]] = {}
-    for task, result in zip(tasks, done, strict=True):
-        arrays.setdefault(f"{task.filter}/{task.p0}", []).append(result)
-    whole = {key: RunArrays(*map(np.concatenate, zip(*parts, strict=True))) for key, parts in arrays.items()}
-    columns = {name: {key: getattr(r, name) for key, r in whole.items()} for name in RunArrays._fields}
-    return StudyResult(config, study_field(config).times, **columns)
-
-
-def quick(config: StudyConfig) -> StudyConfig:
-    """A small study of the same kind: seconds, and too few runs for its verdicts to mean much."""
-    return replace(config, runs=10, population=40, control_runs=80, batch=20)
+QUICK = {"runs": 10, "population": 40, "control_runs": 80, "batch": 20}
+"""A small study of the same kind: seconds, and too few runs for its verdicts to mean much."""

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.iekf.rules import DOF, Curves, Rule, Scene
+from vslam_ref.experiments.iekf.measures import DOF, Curves, Scene
+from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.metrics import consistency
 from vslam_ref.metrics.consistency.bootstrap import resampled_subset_weights
 

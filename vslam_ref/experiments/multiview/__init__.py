@@ -1,1 +1,1 @@
-"""The study behind figure 1.1: pictures with exact cameras, points from them, and cameras from the points."""
+"""Figure 1.1 from a real reconstruction: what is looked at (``scene``) and what is found (``study``)."""

@@ -71,7 +71,7 @@ class Resected(NamedTuple):
     flipped: Error
 
 
-class Study(NamedTuple):
+class Reconstruction(NamedTuple):
     """Everything that is judged and drawn.
 
     Attributes
@@ -103,7 +103,7 @@ class Study(NamedTuple):
     as_filed: tuple[Resected, ...]
 
 
-def study_world(config: MultiviewConfig, filed: World) -> Study:
+def study_world(config: MultiviewConfig, filed: World) -> Reconstruction:
     """Triangulate all tracks, measure all pairs, leave out and resect every camera."""
     shift, sd = principal_offset(filed)
     shift = shift if sd.max() <= config.shift_known_px else np.zeros(2)
@@ -111,7 +111,7 @@ def study_world(config: MultiviewConfig, filed: World) -> Study:
     points = triangulate(world.views, world.uv, world.mask)
     consistent = pairwise_distance(world.views, world.uv, world.mask) <= config.gate_px
     resected = _leave_each_out(config, world)
-    return Study(
+    return Reconstruction(
         config,
         world,
         shift,

@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from vslam_ref.experiments.slam_log.compare import Comparison
 from vslam_ref.geometry import se2, so2
 from vslam_ref.plot.saving import save_figure
 from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
-from vslam_ref.support import files
+from vslam_ref.support import files, pages
 from vslam_ref.support.json_text import to_json
 from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
 from vslam_ref.systems.slam_log.evaluate import reference_point
@@ -141,34 +140,17 @@ def _show(value: Any) -> str:
     return str(value) if isinstance(value, int) else f"{value:.4g}"
 
 
-_STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
-  color: #1b1b1b; background: #fff; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { border: 1px solid #c8c8c8; padding: .3rem .6rem; text-align: right; }
-th:first-child { text-align: left; } th { background: #f3f3f3; } img { max-width: 100%; height: auto; }"""
-
-
 def page(content: Mapping[str, Any], title: str, errors: bool) -> str:
-    """``report.html``: no script, no font, no request except for the figures beside it."""
+    """``report.html``: figures beside it, the table of numbers in it."""
     heads, rows = number_rows(content)
-    head = "".join(f'<th scope="col">{escape(h)}</th>' for h in heads)
-    body = "\n".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>'
-        + "".join(f"<td>{escape(c)}</td>" for c in row[1:])
-        + "</tr>"
-        for row in rows
-    )
     dropped = ", ".join(f"{n} {what}" for what, n in content["dropped"].items()) or "none"
     notes = f"{content['sightings']} sightings; dropped by the reader: {dropped}. "
     notes += f"Reference: {content['truth'] or 'none'}."
-    figure = '<p><img src="errors.svg" alt="Errors with 3 sigma bands"></p>\n' if errors else ""
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f"<h1>{escape(title)}</h1>\n<p>{escape(notes)}</p>\n"
-        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"
-        f'<p><img src="map.svg" alt="Map and trajectory beside the truth"></p>\n{figure}'
-        '<p><a href="result.json">result.json</a></p>\n</main>\n</body>\n</html>\n'
+    return pages.page(
+        title,
+        pages.tag("p", notes),
+        pages.table(heads, rows, caption="Numbers", kind="numbers"),
+        pages.image("map.svg", "Map and trajectory beside the truth"),
+        pages.image("errors.svg", "Errors with 3 sigma bands") if errors else None,
+        pages.tag("p", pages.links({"result.json": "result.json"})),
     )

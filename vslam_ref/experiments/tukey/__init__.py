@@ -1,1 +1,1 @@
-"""What the study of A2.8 computes; the experiment itself is ``tukey_errata``."""
+"""A's Tukey loss as printed: the experiment ``tukey-errata``, and the scenes it looks at."""

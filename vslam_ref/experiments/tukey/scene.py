@@ -60,24 +60,17 @@ class Run(NamedTuple):
         Mean displacement of the landmarks by the estimated pose.
     clean : ndarray, shape (costs,)
         The same, squared, without wrong sightings, started at the truth.
-    far_cost, true_cost : float
+    far_cost, true_cost : ndarray, shape ()
         The printed objective far away from every sighting, and at the truth.
-    reweighted : float
+    reweighted : ndarray, shape ()
         Between the pose by Tukey's weights and that by A2.8 read as the reweighted residual.
     """
 
     error: Array
     clean: Array
-    far_cost: float
-    true_cost: float
-    reweighted: float
-
-
-class Task(NamedTuple):
-    """One scene."""
-
-    config: TukeyConfig
-    seed: np.random.SeedSequence
+    far_cost: Array
+    true_cost: Array
+    reweighted: Array
 
 
 def losses() -> dict[str, Loss]:
@@ -135,9 +128,9 @@ def reweight(scene: Scene, seen: Array, loss: Loss, as_printed: bool, reach: flo
     return x
 
 
-def simulate(task: Task) -> Run:
+def simulate(config: TukeyConfig, point: None, seed: np.random.SeedSequence) -> Run:
     """All costs from all starts in one scene."""
-    config, rng = task.config, np.random.default_rng(task.seed)
+    rng = np.random.default_rng(seed)
     scene, costs, reach = make_scene(config, rng), losses(), config.radius / config.sigma
     heading = rng.uniform(-np.pi, np.pi)
     way = np.array([np.cos(heading), np.sin(heading), 0.0])
@@ -151,7 +144,7 @@ def simulate(task: Task) -> Run:
     ]
     clean = [error(descend(scene, scene.honest, loss, np.zeros(3), reach)) ** 2 for loss in costs.values()]
     printed, far = costs["printed"], np.array([10 * reach, 0.0, 0.0])
-    far_cost, true_cost = (objective(scene, printed, x, reach) for x in (far, np.zeros(3)))
+    far_cost, true_cost = (np.array(objective(scene, printed, x, reach)) for x in (far, np.zeros(3)))
     poses = [reweight(scene, scene.seen, costs["corrected"], flag, reach) for flag in (False, True)]
-    apart = float(np.abs(poses[0] - poses[1]).max())
+    apart = np.array(np.abs(poses[0] - poses[1]).max())
     return Run(np.array(found), np.array(clean), far_cost, true_cost, apart)

@@ -20,12 +20,13 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
+from vslam_ref.experiments.grids.beams import increment_of, scan_of
 from vslam_ref.geometry import se2
 from vslam_ref.grids import MapConfig, Scan, StaticDynamicMap
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
 from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
-from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording, simulate, turned
+from vslam_ref.worlds import floor_plan
+from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording
 
 MODES = ("separated", "plain", "ideal")
 MATCHERS = ("robust", "squares")
@@ -81,14 +82,21 @@ class LocalisationConfig:
             raise ValueError(f"lever={self.lever}: need a length > 0")
 
 
-class Task(NamedTuple):
-    """One run at one density; ``spoil``: draw maps from wrong poses too; ``squares``: match so, too."""
+class Point(NamedTuple):
+    """One density; ``spoil``: draw maps from wrong poses too; ``squares``: match with least squares, too."""
 
-    config: LocalisationConfig
     density: float
-    seed: np.random.SeedSequence
     spoil: bool
-    squares: bool = False
+    squares: bool
+
+
+def points(config: LocalisationConfig) -> list[Point]:
+    """All densities, and ``error_density`` for the wrong poses if it is none of them."""
+    densest = config.densities[-1]
+    found = [Point(d, d == config.error_density, d == densest) for d in config.densities]
+    if config.error_density not in config.densities:
+        found.append(Point(config.error_density, True, False))
+    return found
 
 
 class Run(NamedTuple):
@@ -104,7 +112,7 @@ class Run(NamedTuple):
         Of the separated mode: beams rightly called moving, called moving, on moving things.
     spoiled : ndarray, shape (errors, 3)
         The same counts for maps drawn from true poses plus errors; zero where not asked for.
-    on_people : float
+    on_people : ndarray, shape ()
         Share of beams that end on a person.
     """
 
@@ -113,7 +121,7 @@ class Run(NamedTuple):
     squares: Array
     beams: Array
     spoiled: Array
-    on_people: float
+    on_people: Array
 
 
 def beam_counts(recording: Recording, k: int, pose: Array, maps: StaticDynamicMap) -> Array:
@@ -181,15 +189,15 @@ def position_errors(recording: Recording, poses: Array) -> tuple[float, float]:
     return float(np.sqrt(np.mean(off**2))), float(off[-1])
 
 
-def simulate_run(task: Task) -> Run:
+def simulate(config: LocalisationConfig, point: Point, seed: np.random.SeedSequence) -> Run:
     """One run at one density, all modes on the same recording."""
-    config = task.config
-    crowd = dataclasses.replace(config.world.crowd, density=task.density)
-    rng = generator(task.seed)
-    recording = turned(simulate(dataclasses.replace(config.world, crowd=crowd), rng), config.turn)
+    crowd = dataclasses.replace(config.world.crowd, density=point.density)
+    rng = np.random.default_rng(seed)
+    world = dataclasses.replace(config.world, crowd=crowd)
+    recording = floor_plan.turned(floor_plan.simulate(world, rng), config.turn)
     errors = np.full((len(MATCHERS), len(MODES), 2), np.nan)
     beams = np.zeros(3)
-    for m, matcher in enumerate(MATCHERS if task.squares else MATCHERS[:1]):
+    for m, matcher in enumerate(MATCHERS if point.squares else MATCHERS[:1]):
         for i, mode in enumerate(MODES):
             poses, counted, _ = localise(
                 recording, mode_of(config.slam, matcher, mode), ideal=mode == "ideal"
@@ -198,11 +206,11 @@ def simulate_run(task: Task) -> Run:
             if (matcher, mode) == ("robust", "separated"):
                 beams = counted
     spoiled = np.zeros((len(config.errors), 3))
-    if task.spoil:
+    if point.spoil:
         for i, sigma in enumerate(config.errors):
             spoiled[i] = spoiled_counts(recording, config.slam.map, sigma, config.lever, rng)
     rmse, final = errors[0].T
-    return Run(rmse, final, errors[1, :, 0], beams, spoiled, recording.share_on_people)
+    return Run(rmse, final, errors[1, :, 0], beams, spoiled, np.array(recording.share_on_people))
 
 
 def mode_of(config: GridSlamConfig, matcher: str, mode: str) -> GridSlamConfig:

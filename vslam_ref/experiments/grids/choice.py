@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.moving.readings import generator, increment_of, scan_of
+from vslam_ref.experiments.grids.beams import increment_of, scan_of
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids import MapConfig
 from vslam_ref.grids.landmarks import LandmarkConfig
 from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
-from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, Recording, simulate
+from vslam_ref.worlds import floor_plan
+from vslam_ref.worlds.floor_plan import CrowdConfig, FloorPlanConfig, LaserConfig, Recording
 
 MODES = ("forbidden", "allowed", "odometry")
 MOVED = 0.25
@@ -51,13 +52,6 @@ class ChoiceConfig:
         """Refuse studies that mean nothing."""
         if self.runs < 2 or self.world.carts < 1:
             raise ValueError(f"runs={self.runs}, carts={self.world.carts}: need at least 2 and 1")
-
-
-class Task(NamedTuple):
-    """One run."""
-
-    config: ChoiceConfig
-    seed: np.random.SeedSequence
 
 
 class Run(NamedTuple):
@@ -131,10 +125,9 @@ def follow(recording: Recording, config: GridSlamConfig) -> tuple[float, list[fl
     return float(np.sqrt(np.mean(off**2))), counts
 
 
-def simulate_run(task: Task) -> Run:
+def simulate(config: ChoiceConfig, point: None, seed: np.random.SeedSequence) -> Run:
     """One run, all modes on the same recording."""
-    config = task.config
-    recording = simulate(config.world, generator(task.seed))
+    recording = floor_plan.simulate(config.world, np.random.default_rng(seed))
     allowed = LandmarkConfig(static_only=False, withdraw=False)
     modes = (
         config.slam,

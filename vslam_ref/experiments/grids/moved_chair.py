@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
-from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
-from vslam_ref.experiments.moving.readings import generator, scan_of
+from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
+from vslam_ref.experiments.grids.beams import scan_of
 from vslam_ref.grids import LogOddsGrid, MapConfig, StaticDynamicMap
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
+from vslam_ref.worlds import floor_plan
 from vslam_ref.worlds.floor_plan import (
     Box,
     FloorPlan,
@@ -31,7 +32,6 @@ from vslam_ref.worlds.floor_plan import (
     cover,
     hall,
     seen_cells,
-    simulate,
 )
 from vslam_ref.worlds.floor_plan.plan import schedule
 
@@ -74,13 +74,6 @@ class ChairConfig:
 VARIANTS = ("printed", "ageing")
 
 
-class Task(NamedTuple):
-    """One run."""
-
-    config: ChairConfig
-    seed: np.random.SeedSequence
-
-
 class Run(NamedTuple):
     """One run, printed and ageing.
 
@@ -101,17 +94,6 @@ class Run(NamedTuple):
     false: Array
 
 
-class Study(NamedTuple):
-    """All runs: as :class:`Run`, runs first, and the times (n,) since the chair was put down."""
-
-    config: ChairConfig
-    since: Array
-    static: Array
-    dynamic: Array
-    old_place: Array
-    false: Array
-
-
 def plan(config: ChairConfig) -> FloorPlan:
     """The hall with the chair; the robot drives to and fro for as long as is watched."""
     way = schedule([config.lift, config.put_down], [[*FROM, 0.0], [*TO, 0.0]])
@@ -125,7 +107,7 @@ def record(config: ChairConfig, seed: np.random.SeedSequence) -> Recording:
     crowd = dataclasses.replace(config.world.crowd, density=config.density)
     end = config.put_down + config.watch
     world = dataclasses.replace(config.world, crowd=crowd, duration=end)
-    return simulate(world, generator(seed), plan(config))
+    return floor_plan.simulate(world, np.random.default_rng(seed), plan(config))
 
 
 def maps(config: ChairConfig) -> tuple[StaticDynamicMap, StaticDynamicMap]:
@@ -134,10 +116,9 @@ def maps(config: ChairConfig) -> tuple[StaticDynamicMap, StaticDynamicMap]:
     return StaticDynamicMap(base), StaticDynamicMap(dataclasses.replace(base, settle_seconds=config.settle))
 
 
-def simulate_run(task: Task) -> Run:
+def simulate(config: ChairConfig, point: None, seed: np.random.SeedSequence) -> Run:
     """One recording, drawn by both variants."""
-    config = task.config
-    recording = record(config, task.seed)
+    recording = record(config, seed)
     cells, both = cover(recording), maps(config)
     middles = _middles(cells.shape, cells.origin_xy, cells.resolution)
     on_old = (np.abs(middles - np.array(FROM)) < 0.25).all(axis=-1)
@@ -177,26 +158,17 @@ def _decided(grid: LogOddsGrid, middles: Array) -> BoolArray:
     return decided
 
 
-def run(config: ChairConfig, context: RunContext) -> Result:
-    """Run all recordings."""
-    seeds = np.random.SeedSequence(config.seed).spawn(config.runs)
-    done = context.map(simulate_run, [Task(config, s) for s in seeds], "chairs")
-    n = min(r.static.shape[1] for r in done)
-    stacked = {name: np.array([getattr(r, name)[..., :n] for r in done]) for name in Run._fields}
-    since = config.world.robot.scan_period * np.arange(n) - config.put_down
-    study = Study(config, since, **stacked)
-    return Result(
-        series={
-            "since_put_down": since,
-            "static": _mean(study.static),
-            "dynamic": _mean(study.dynamic),
-            "old_place": _mean(study.old_place),
-        },
-        seed=config.seed,
-        runs=config.runs,
-        arrays=stacked,
-        payload=study,
-    )
+def since(study: Study[Run]) -> Array:
+    """Seconds (n,) since the chair was put down, of every scan."""
+    config = study.config
+    scans = config.world.robot.scan_period * np.arange(study.data.static.shape[-1])
+    return np.asarray(scans - config.put_down)
+
+
+def series(study: Study[Run]) -> dict[str, Array]:
+    """Means over the runs, over time."""
+    names = ("static", "dynamic", "old_place")
+    return {"since_put_down": since(study)} | {n: _mean(getattr(study.data, n)) for n in names}
 
 
 def _mean(values: Array) -> Array:
@@ -207,96 +179,101 @@ def _mean(values: Array) -> Array:
     return mean
 
 
-def shares(study: Study, values: Array, variant: str, after: float, until: float = np.inf) -> Array:
+def shares(study: Study[Run], name: str, variant: str, after: float, until: float = np.inf) -> Array:
     """Mean share (runs,) of a variant over the scans between two times since the chair was put down."""
-    within = (study.since >= after) & (study.since <= until)
-    part = values[:, VARIANTS.index(variant)][:, within]
+    within = (since(study) >= after) & (since(study) <= until)
+    part = getattr(study.data, name)[:, VARIANTS.index(variant)][:, within]
     known = np.isfinite(part)
     sums = np.where(known, part, 0.0).sum(axis=1)
     return np.where(known.any(axis=1), sums / np.maximum(known.sum(axis=1), 1), np.nan)
 
 
-def claims(result: Result) -> list[Claim]:
+def claims(study: Study[Run]) -> list[Claim]:
     """Judge both variants."""
-    study: Study = result.payload
     return [_for_ever(study), _settles(study), _leaves(study), _walkers(study)]
 
 
-def _judge(id: str, text: str, rule: str, holds: BoolArray, measured: dict[str, float], source: str) -> Claim:
+def _judge(
+    id: str, text: str, rule: str, holds: BoolArray, found: str, measured: dict[str, float], source: str
+) -> Claim:
     """A claim that must hold in every run; NaN compares as false, so a chair that nobody saw fails it."""
-    return Claim(
-        id, source, text, rule, measured, None, None, float(holds.mean()), verdict(bool(holds.all()))
+    found = f"{found}; it holds in {int(holds.sum())} of {len(holds)} runs"
+    return judged(
+        id, source, text, rule, bool(holds.all()), found, measured,
+        share=float(holds.mean()),
     )  # fmt: skip
 
 
-def _for_ever(study: Study) -> Claim:
+def _for_ever(study: Study[Run]) -> Claim:
     last = study.config.watch - SLACK
-    d = shares(study, study.dynamic, "printed", last)
-    s = shares(study, study.static, "printed", last)
+    d, s = (shares(study, name, "printed", last) for name in ("dynamic", "static"))
     return _judge(
         "dynamic-for-ever",
         "Under the table, a chair put down on once-free floor is dynamic for ever",
         f"in every run, over the last {SLACK:g} s of the watch: share of its cells in D > 0.5 and in S < 0.5",
         (d > 0.5) & (s < 0.5),
+        f"{last:g} s after the chair was put down, D holds {d.mean():.0%} of its cells and S {s.mean():.0%}",
         {"dynamic": float(d.mean()), "static": float(s.mean())},
         "A§4.2-4.3, errata",
     )
 
 
-def _settles(study: Study) -> Claim:
-    after = study.config.settle + SLACK
-    d = shares(study, study.dynamic, "ageing", after)
-    s = shares(study, study.static, "ageing", after)
-    before = shares(study, study.dynamic, "ageing", 1.0, study.config.settle - 1.0)
+def _settles(study: Study[Run]) -> Claim:
+    settle = study.config.settle
+    d, s = (shares(study, name, "ageing", settle + SLACK) for name in ("dynamic", "static"))
+    before = shares(study, "dynamic", "ageing", 1.0, settle - 1.0)
     return _judge(
         "ageing-mends-it",
         "With ageing it is dynamic at first, and static once it has stood there for T seconds",
         f"in every run: share in D > 0.5 until 1 s before T; after T + {SLACK:g} s in S > 0.5 and in D < 0.5",
         (before > 0.5) & (s > 0.5) & (d < 0.5),
+        f"With ageing D holds {before.mean():.0%} of the chair's cells in the first {settle:g} s; after "
+        "that S holds "
+        f"{s.mean():.0%} and D {d.mean():.0%}",
         {"dynamic_before": float(before.mean()), "dynamic": float(d.mean()), "static": float(s.mean())},
         "ageing variant",
     )
 
 
-def _leaves(study: Study) -> Claim:
+def _leaves(study: Study[Run]) -> Claim:
     """The other half of the move."""
     away = study.config.put_down - study.config.lift
-    old = np.stack([shares(study, study.old_place, v, SLACK - away + 1.0) for v in VARIANTS])
+    old = np.stack([shares(study, "old_place", v, SLACK - away + 1.0) for v in VARIANTS])
     return _judge(
         "leaves-its-old-place",
         "S lets go of the place from which the chair was taken, under both",
         f"in every run and both variants: share still static < 0.05 from {SLACK + 1:g} s after it was lifted",
         np.array((old < 0.05).all(axis=0), dtype=np.bool_),
+        f"{SLACK + 1:g} s after the chair was lifted S still holds {old[0].mean():.1%} of its old place "
+        "under the "
+        f"table and {old[1].mean():.1%} with ageing; 5 % are allowed",
         {v: float(o.mean()) for v, o in zip(VARIANTS, old, strict=True)},
         "A§4.2",
     )
 
 
-def _walkers(study: Study) -> Claim:
+def _walkers(study: Study[Run]) -> Claim:
     """The price of ageing."""
-    printed, ageing = study.false.T
+    printed, ageing = study.data.false.T
     return _judge(
         "ageing-takes-in-no-walkers",
         "Ageing puts no more moving things into S than the table does",
         "in every run: share of S that nothing static covers is at most 0.02 larger than without ageing",
         np.array(ageing - printed <= 0.02, ndmin=1),
+        f"Of S {printed.mean():.1%} are covered by nothing static under the table and {ageing.mean():.1%} "
+        "with "
+        "ageing; 2 points more are allowed",
         {"printed": float(printed.mean()), "ageing": float(ageing.mean())},
         "ageing variant",
     )
 
 
-def figure(result: Result) -> Figure:
+def figure(study: Study[Run]) -> Figure:
     """Shares of the chair in S and in D over time."""
     from vslam_ref.plot.grids import chair_figure
 
-    study: Study = result.payload
-    series = {name: _mean(getattr(study, name)) for name in ("static", "dynamic")}
-    return chair_figure(study.since, series["static"], series["dynamic"], VARIANTS, study.config.settle)
-
-
-def quick(config: ChairConfig) -> ChairConfig:
-    """Two runs, half a minute."""
-    return dataclasses.replace(config, runs=2, watch=18.0, settle=6.0)
+    static, dynamic = _mean(study.data.static), _mean(study.data.dynamic)
+    return chair_figure(since(study), static, dynamic, VARIANTS, study.config.settle)
 
 
 EXPERIMENT = Experiment(
@@ -304,8 +281,15 @@ EXPERIMENT = Experiment(
     title="A chair that is moved, with and without ageing",
     source="A, sections 4.2 and 4.3",
     config_type=ChairConfig,
-    run=run,
+    simulate=simulate,
+    series=series,
     claims=claims,
     figure=figure,
-    quick=quick,
+    about={
+        "static": "share of the chair's cells, of those hit now, that S holds; (runs, printed/ageing, scans)",
+        "dynamic": "share of the same cells that D holds; (runs, printed/ageing, scans)",
+        "old_place": "share of the chair's first place, crossed now, still in S; (runs, variant, scans)",
+        "false": "share of S at the end that no static thing covers; (runs, printed/ageing)",
+    },
+    quick={"runs": 2, "watch": 18.0, "settle": 6.0},
 )

@@ -12,14 +12,13 @@ What is counted, fixed before the runs:
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
-from vslam_ref.experiments.moving.readings import generator, scan_of
+from vslam_ref.experiments.grids.beams import scan_of
 from vslam_ref.grids import InverseSensor, LogOddsGrid, MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.log_odds import OCCUPIED
 from vslam_ref.worlds.floor_plan import (
@@ -30,8 +29,6 @@ from vslam_ref.worlds.floor_plan import (
     cell_truth,
     cover,
     seen_cells,
-    simulate,
-    turned,
 )
 
 MAPS = ("separated", "plain")
@@ -91,15 +88,7 @@ class SeparationConfig:
             raise ValueError(f"densities={self.densities}: must hold 0 and the judged crowd {JUDGED}")
 
 
-class Task(NamedTuple):
-    """One run."""
-
-    config: SeparationConfig
-    density: float
-    seed: np.random.SeedSequence
-
-
-class Run(NamedTuple):
+class Counts(NamedTuple):
     """Counts of one run.
 
     Attributes
@@ -108,13 +97,13 @@ class Run(NamedTuple):
         For S and the plain grid: decided and right, decided, asked for, asked for and decided.
     moving : ndarray, shape (4,)
         The same for D.
-    on_people : float
+    on_people : ndarray, shape ()
         Share of the beams that end on a person.
     """
 
     static: Array
     moving: Array
-    on_people: float
+    on_people: Array
 
 
 def decided(grid: LogOddsGrid, cells: Cells) -> BoolArray:
@@ -145,7 +134,7 @@ def precision_recall(count: Array) -> Array:
     return np.stack([precision, recall], -1)
 
 
-def measure(recording: Recording, config: SeparationConfig) -> Run:
+def measure(recording: Recording, config: SeparationConfig) -> Counts:
     """Draw all maps of one recording from true poses, and count."""
     cells = cover(recording, resolution=config.map.resolution)
     separated, plain = StaticDynamicMap(config.map), PlainMap(config.plain)
@@ -165,13 +154,4 @@ def measure(recording: Recording, config: SeparationConfig) -> Run:
             moving += counts(says, now, truth.moving, seen.ended & truth.moving)
     counted, asked = met >= config.looks, last & (ended >= config.looks)
     static = [counts(decided(m, cells), counted, last, asked) for m in (separated.static(), plain.occupied())]
-    return Run(np.stack(static), moving, recording.share_on_people)
-
-
-def simulate_run(task: Task) -> Run:
-    """One run at one density."""
-    config = task.config
-    crowd = dataclasses.replace(config.world.crowd, density=task.density)
-    world = dataclasses.replace(config.world, crowd=crowd)
-    recording = simulate(world, generator(task.seed))
-    return measure(turned(recording, config.turn) if config.turn else recording, config)
+    return Counts(np.stack(static), moving, np.array(recording.share_on_people))

@@ -10,16 +10,19 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext
+from vslam_ref.arrays import Array
+from vslam_ref.experiments.framework import Claim, Experiment, Study, batches
+from vslam_ref.experiments.framework.driver import Unit, stack
 from vslam_ref.experiments.iekf import neighbours
-from vslam_ref.experiments.iekf.neighbours import FILTERS, STARTS, Drive, Errors
+from vslam_ref.experiments.iekf.neighbours import Errors
+from vslam_ref.experiments.iekf.study import noises
 from vslam_ref.filters import vehicle
 from vslam_ref.filters.range_bearing import cartesian_from_polar
-from vslam_ref.worlds.vehicle_field import draw_noise
+from vslam_ref.worlds.drive import Drive
 from vslam_ref.worlds.waypoint_course import (
     WaypointConfig,
     WaypointCourse,
@@ -57,16 +60,6 @@ class BaileyConfig:
             raise ValueError(f"runs={self.runs} must be >= 2, batch={self.batch} >= 1")
 
 
-class Task(NamedTuple):
-    """Some runs of one filter."""
-
-    config: BaileyConfig
-    filter: str
-    start: str
-    first: int
-    size: int
-
-
 @lru_cache(maxsize=2)
 def course_of(config: BaileyConfig) -> WaypointCourse:
     """The course; its landmarks come from the first child of the seed."""
@@ -74,71 +67,59 @@ def course_of(config: BaileyConfig) -> WaypointCourse:
     return make_waypoint_course(config.world, np.random.default_rng(child))
 
 
-def simulate(task: Task) -> Errors:
-    """Run one filter over some runs."""
-    children = np.random.SeedSequence(task.config.seed).spawn(2)[1].spawn(task.first + task.size)
-    return neighbours.join([_one(task, child) for child in children[task.first :]])
+def seeds(config: BaileyConfig, point: tuple[str, str]) -> list[Unit]:
+    """Some runs for each task."""
+    return batches(np.random.SeedSequence(config.seed).spawn(2)[1].spawn(config.runs), config.batch)
 
 
-def _one(task: Task, child: np.random.SeedSequence) -> Errors:
+def simulate(
+    config: BaileyConfig, point: tuple[str, str], seeds: tuple[np.random.SeedSequence, ...]
+) -> Errors:
+    """Run one filter from one start over some runs, one after the other."""
+    return stack([_one(config, *point, seed) for seed in seeds], [seeds])  # type: ignore[no-any-return]
+
+
+def _one(config: BaileyConfig, name: str, start: str, seed: np.random.SeedSequence) -> Errors:
     """One run, as a batch of one."""
-    c, world = task.config.world, course_of(task.config)
-    noise = draw_noise(world, [np.random.default_rng(child)])
+    c, world = config.world, course_of(config)
+    noise = noises(world, [seed])
     controls = world.controls + noise.controls[0] * [c.sigma_v, c.sigma_g]
     rear = rear_axle_control(controls, c.cov_u)
     steps = vehicle.ackermann_increment(rear.control, rear.cov, c.wheelbase, c.dt)
-    increments = vehicle.Increment(steps.ds[None], steps.dalpha[None], steps.cov[None])
     seen = {}
     for s, e in zip(world.sightings, noise.sightings, strict=True):
         polar = s.z + e[0] * [c.sigma_range, c.sigma_bearing]
         z, cov_z = cartesian_from_polar(polar, c.sigma_range, c.sigma_bearing)
         seen[s.step] = (s.ids, z[None], cov_z)
-    p0 = np.array(task.config.p0_high if task.start == "high" else (0.0, 0.0, 0.0))
+    p0 = neighbours.initial(config, start)
     mean = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
-    slam = neighbours.make_filter(task.filter, mean, np.diag(p0), c.landmarks)
-    return neighbours.follow(slam, Drive(increments, seen, world.T_world_vehicle, c.sighting_steps))
+    slam = neighbours.make_filter(name, mean, np.diag(p0), c.landmarks)
+    drive = Drive(vehicle.Increment(steps.ds[None], steps.dalpha[None], steps.cov[None]), seen)
+    return neighbours.errors_of(slam, drive, world.T_world_vehicle, c.sighting_steps)
 
 
-def run(config: BaileyConfig, context: RunContext) -> Result:
-    """Run all filters from both starts."""
-    tasks = [
-        Task(config, name, start, first, min(config.batch, config.runs - first))
-        for start in STARTS
-        for name in FILTERS
-        for first in range(0, config.runs, config.batch)
-    ]
-    names = [f"{task.filter}/{task.start}" for task in tasks]
-    errors = neighbours.collect(names, context.map(simulate, tasks, "Bailey's setup"))
-    arrays = neighbours.per_run_arrays(errors)
-    time = course_of(config).times[:: config.world.sighting_steps]
-    return Result(
-        neighbours.series_of(time, errors),
-        config.seed,
-        config.runs,
-        arrays | {"time": time},
-        (config, errors),
-    )
+def times(config: BaileyConfig) -> Array:
+    """When poses are recorded."""
+    return course_of(config).times[:: config.world.sighting_steps]
 
 
-def claims(result: Result) -> list[Claim]:
+def series(study: Study[dict[str, Errors]]) -> dict[str, object]:
+    """Curves over time."""
+    return neighbours.series_of(times(study.config), study.data)
+
+
+def claims(study: Study[dict[str, Errors]]) -> list[Claim]:
     """Judge the questions both setups are asked; nothing published can be compared."""
-    config, errors = result.payload
-    enough = config.runs >= 50 and config.world.loops >= 2
-    return neighbours.common_claims(SOURCE, errors, enough, np.random.default_rng([config.seed, 1]))
+    config = study.config
+    enough = config.runs >= neighbours.LEAST_RUNS and config.world.loops >= 2
+    return neighbours.common_claims(SOURCE, study.data, enough, study.rng(1))
 
 
-def figure(result: Result) -> Figure:
+def figure(study: Study[dict[str, Errors]]) -> Figure:
     """Errors and NEES over time."""
     from vslam_ref.plot.neighbours import neighbours_figure
 
-    config, _ = result.payload
-    return neighbours_figure(result.series, runs=config.runs, published={})
-
-
-def quick(config: BaileyConfig) -> BaileyConfig:
-    """Two runs of one round with a fifth of the controls."""
-    world = dataclasses.replace(config.world, loops=1, dt=0.1, sighting_steps=5)
-    return dataclasses.replace(config, world=world, runs=3, batch=3)
+    return neighbours_figure(series(study), runs=study.config.runs, published={})
 
 
 EXPERIMENT = Experiment(
@@ -146,8 +127,15 @@ EXPERIMENT = Experiment(
     title="The setup of Bailey's simulator: front-wheel speed, range and bearing",
     source="Bailey's EKF-SLAM simulator, configuration file; course and landmarks declared",
     config_type=BaileyConfig,
-    run=run,
+    simulate=simulate,
+    points=neighbours.points,
+    name="/".join,
+    seeds=seeds,
+    series=series,
+    arrays=lambda study: neighbours.arrays(times(study.config), study.data),
     claims=claims,
     figure=figure,
-    quick=quick,
+    about=neighbours.ABOUT,
+    # one round with a fifth of the controls
+    quick={"world.loops": 1, "world.dt": 0.1, "world.sighting_steps": 5, "runs": 3, "batch": 3},
 )

@@ -19,14 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.framework import Claim, Experiment, Result, RunContext, verdict
+from vslam_ref.experiments.framework import Claim, Experiment, Study, batches, judged
 from vslam_ref.experiments.iekf import neighbours
 from vslam_ref.experiments.iekf.judge import TELLING
-from vslam_ref.experiments.iekf.neighbours import FILTERS, SETTLE, STARTS, Drive, Errors
+from vslam_ref.experiments.iekf.neighbours import SETTLE, Errors
+from vslam_ref.experiments.iekf.study import noises
 from vslam_ref.filters import vehicle
 from vslam_ref.metrics.consistency import percentile_interval, resample_weights, subset_weights
 from vslam_ref.worlds.circle import Circle, CircleConfig, make_circle
-from vslam_ref.worlds.vehicle_field import draw_noise
+from vslam_ref.worlds.drive import Drive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 SOURCE = "UKF-M, 2D SLAM benchmark; Huang et al. 2010"
 SAMPLES = 2000
+LEAST_RUNS = 100
+"""Published numbers are means over 100 runs."""
 
 
 class Published(NamedTuple):
@@ -92,65 +95,42 @@ class CircleStudyConfig:
             )
 
 
-class Task(NamedTuple):
-    """One batch of runs of one filter."""
-
-    config: CircleStudyConfig
-    filter: str
-    start: str
-    first: int
-    size: int
-
-
 @lru_cache(maxsize=2)
-def _world(config: CircleConfig) -> Circle:
+def world_of(config: CircleConfig) -> Circle:
+    """The course."""
     return make_circle(config)
 
 
-def simulate(task: Task) -> Errors:
-    """Run one filter over one batch of runs."""
-    config, c = task.config, task.config.world
-    world = _world(c)
-    children = np.random.SeedSequence(config.seed).spawn(task.first + task.size)[task.first :]
-    noise = draw_noise(world, [np.random.default_rng(child) for child in children])
-    p0 = np.array(config.p0_high if task.start == "high" else (0.0, 0.0, 0.0))
+def simulate(
+    config: CircleStudyConfig, point: tuple[str, str], seeds: tuple[np.random.SeedSequence, ...]
+) -> Errors:
+    """Run one filter from one start over one batch of runs."""
+    c, world = config.world, world_of(config.world)
+    noise = noises(world, seeds)
     controls = world.controls + noise.controls * [c.sigma_v, c.sigma_omega]
     cov_z = c.sigma_z**2 * np.eye(2)
     seen = {
         s.step: (s.ids, s.z + c.sigma_z * e, cov_z)
         for s, e in zip(world.sightings, noise.sightings, strict=True)
     }
-    increments = vehicle.differential_increment(controls, c.cov_u, c.dt)
-    mean = world.T_world_vehicle[0] + noise.start * np.sqrt(p0)
-    slam = neighbours.make_filter(task.filter, mean, np.diag(p0), c.landmarks)
-    return neighbours.follow(slam, Drive(increments, seen, world.T_world_vehicle, every=1))
+    drive = Drive(vehicle.differential_increment(controls, c.cov_u, c.dt), seen)
+    p0 = neighbours.initial(config, point[1])
+    slam = neighbours.make_filter(
+        point[0], world.T_world_vehicle[0] + noise.start * np.sqrt(p0), np.diag(p0), c.landmarks
+    )
+    return neighbours.errors_of(slam, drive, world.T_world_vehicle)
 
 
-def run(config: CircleStudyConfig, context: RunContext) -> Result:
-    """Run all filters from both starts."""
-    tasks = [
-        Task(config, name, start, first, min(config.batch, config.population - first))
-        for start in STARTS
-        for name in FILTERS
-        for first in range(0, config.population, config.batch)
-    ]
-    names = [f"{task.filter}/{task.start}" for task in tasks]
-    errors = neighbours.collect(names, context.map(simulate, tasks, "circle"))
-    arrays = neighbours.per_run_arrays(errors)
-    time = _world(config.world).times
-    series = neighbours.series_of(time, errors)
-    return Result(series, config.seed, config.runs, arrays | {"time": time}, (config, errors))
-
-
-def claims(result: Result) -> list[Claim]:
+def claims(study: Study[dict[str, Errors]]) -> list[Claim]:
     """Judge the published numbers, then the questions both setups are asked."""
-    config, errors = result.payload
-    rng = np.random.default_rng([config.seed, 1])
+    config, rng = study.config, study.rng(1)
     # another world has no published numbers; few runs or a short course allow no verdict
-    same = config.world == CircleConfig() and config.population >= 4 * config.runs and config.runs >= 100
-    judged = [published_claim(p, errors, config.runs, same, rng) for p in PUBLISHED]
-    enough = config.population >= 100 and config.world.steps >= CircleConfig().steps
-    return judged + neighbours.common_claims(SOURCE, errors, enough, rng)
+    same = (
+        config.world == CircleConfig() and config.population >= 4 * config.runs and config.runs >= LEAST_RUNS
+    )
+    numbers = [published_claim(p, study.data, config.runs, same, rng) for p in PUBLISHED]
+    enough = config.population >= LEAST_RUNS and config.world.steps >= CircleConfig().steps
+    return numbers + neighbours.common_claims(SOURCE, study.data, enough, rng)
 
 
 def published_claim(
@@ -182,35 +162,36 @@ def published_claim(
         measured["reason"] = "not the published world, or too few runs"
     elif not holds:
         measured["reason"] = f"{ours:.3g} against {p.value:g}; {share:.0%} of studies near, null {null:.0%}"
-    return Claim(
+    return judged(
         f"{p.id}-published",
         SOURCE,
         p.text,
         f"{what} over all runs and times within {p.tolerance:.0%} of {p.value:g}, and the share of "
         f"{runs}-run studies that are so exceeds the null rate by {TELLING:g}; tested in "
         "the published world only",
+        holds if comparable else None,
+        f"Ours is {ours:.3g}, published is {p.value:g}; {share:.0%} of studies of {runs} runs come within "
+        f"{p.tolerance:.0%} of it"
+        + ("" if comparable else ", but the world or the runs are not the published ones"),
         measured,
-        list(percentile_interval(resampled)),
-        null,
-        share,
-        verdict(holds if comparable else None),
+        ci=percentile_interval(resampled),
+        null_rate=null,
+        share=share,
+        least_runs=LEAST_RUNS,
     )
 
 
-def figure(result: Result) -> Figure:
+def figure(study: Study[dict[str, Errors]]) -> Figure:
     """Errors and NEES over time."""
     from vslam_ref.plot.neighbours import neighbours_figure
 
-    config, _ = result.payload
-    return neighbours_figure(
-        result.series, runs=config.population, published={"heading": (3.02, 2.51), "position": (0.67, 0.55)}
-    )
+    published = {"heading": (3.02, 2.51), "position": (0.67, 0.55)}
+    return neighbours_figure(series(study), runs=study.config.population, published=published)
 
 
-def quick(config: CircleStudyConfig) -> CircleStudyConfig:
-    """One circle, ten runs: nothing to compare."""
-    world = dataclasses.replace(config.world, steps=240)
-    return dataclasses.replace(config, world=world, runs=10, population=10, batch=10)
+def series(study: Study[dict[str, Errors]]) -> dict[str, object]:
+    """Curves over time."""
+    return neighbours.series_of(world_of(study.config.world).times, study.data)
 
 
 EXPERIMENT = Experiment(
@@ -218,8 +199,14 @@ EXPERIMENT = Experiment(
     title="The circle of the OC-EKF and UKF-M studies",
     source="UKF-M, 2D SLAM benchmark (Brossard, Barrau, Bonnabel); Huang, Mourikis, Roumeliotis 2010",
     config_type=CircleStudyConfig,
-    run=run,
+    simulate=simulate,
+    points=neighbours.points,
+    name="/".join,
+    seeds=lambda c, point: batches(np.random.SeedSequence(c.seed).spawn(c.population), c.batch),
+    series=series,
+    arrays=lambda study: neighbours.arrays(world_of(study.config.world).times, study.data),
     claims=claims,
     figure=figure,
-    quick=quick,
+    about=neighbours.ABOUT,
+    quick={"world.steps": 240, "runs": 10, "population": 10, "batch": 10},
 )
