@@ -9,9 +9,15 @@ import pytest
 
 from vslam_ref import _kernels, cli
 from vslam_ref.experiments import registry
-from vslam_ref.experiments.framework import Claim, register, scheduler, unregister
+from vslam_ref.experiments.framework import Claim, progress, register, scheduler, unregister
 
-pytestmark = pytest.mark.usefixtures("toy")
+pytestmark = pytest.mark.usefixtures("toy", "kernels_ready")
+
+
+@pytest.fixture
+def kernels_ready(monkeypatch):
+    """No line about kernels that are compiled now: what is printed is compared word for word."""
+    monkeypatch.setattr(progress, "_compiled", ["numba"])
 
 
 def reproduce(*arguments: str) -> int:
