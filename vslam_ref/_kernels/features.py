@@ -1,7 +1,7 @@
 """Numba twins of the image features: images are flat arrays of bytes in rows, with their width.
 
-FAST has no branches, so that it becomes vector code: the image is copied in strips whose rows lie a fixed number of
-bytes apart, each pixel walks around its circle counting, and 32 of them do so at once.
+FAST has no branches, so that it becomes vector code: the image is copied in strips whose rows lie a fixed
+number of bytes apart, each pixel walks around its circle counting, and 32 of them do so at once.
 """
 
 from __future__ import annotations

@@ -123,9 +123,9 @@ def is_peak(corners: Corners, score: ArrayLike) -> BoolArray:
     -------
     ndarray of bool, shape (n,)
     """
-    values = np.asarray(score, dtype=np.int64)
+    values = np.asarray(score, dtype=np.int16)
     height, width = corners.shape
-    map_of_scores = np.full((height + 2, width + 2), -1)
+    map_of_scores = np.full((height + 2, width + 2), -1, np.int16)
     x, y = corners.xy.T + 1
     map_of_scores[y, x] = values
     around = [map_of_scores[y + i, x + j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]

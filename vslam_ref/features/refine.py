@@ -5,8 +5,8 @@ Wanted are the place u and the offset b of the least :math:`\sum_d r^2`,
 .. math:: r(d) = T(d) + b - I(u + d)
 
 predicted minus measured, over the inner 6 x 6 pixels of the template T.  A step moves the *template* by
-delta: T(d + delta) is nearer to I(u + d).  Its slopes g do not change, so the matrix is made once.  The offset
-takes the mean of everything with it:
+delta: T(d + delta) is nearer to I(u + d).  Its slopes g do not change, so the matrix is made once.  The
+offset takes the mean of everything with it:
 
 .. math:: S = \sum (g - \bar g)(g - \bar g)^T, \qquad S\, \delta = - \sum (g - \bar g)\, r .
 
@@ -29,7 +29,7 @@ from vslam_ref.features.templates import BEFORE, SIDE, bilinear
 INNER = SIDE - 2
 """Pixels of a template with neighbours on all sides, 6 x 6."""
 LEAST_SLOPE = 1.0 / 24.0
-"""Squared grey levels per squared pixel: rounding alone (variance 1/12) gives half a difference this variance."""
+"""Squared grey levels per squared pixel: what rounding alone, of variance 1/12, gives half a difference."""
 FARTHEST = 4.0
 """Pixels; a template that is half a patch away from where it started has found something else."""
 STEPS, NEAR = 10, 0.01
@@ -76,7 +76,7 @@ class Refined(NamedTuple):
     @property
     def ok(self) -> BoolArray:
         """Which ended well."""
-        return self.state == State.OK
+        return np.asarray(self.state == State.OK)
 
 
 def refine(image: ArrayLike, patch: ArrayLike, uv: ArrayLike) -> Refined:
@@ -104,13 +104,13 @@ def refine(image: ArrayLike, patch: ArrayLike, uv: ArrayLike) -> Refined:
 
     Notes
     -----
-    With noise of sigma grey levels in the image, the standard deviation of the place along a direction e is
-    sigma / sqrt(e^T S e): a slope of 20 grey levels per pixel (root mean square) and sigma = 2 make 0.02 pixels.
+    With noise of sigma grey levels in the image, the covariance of the place is sigma^2 S^-1: a slope of 20
+    grey levels per pixel (root mean square, both ways) and sigma = 2 make 2 / (6 * 20) = 0.02 pixels.
 
     Examples
     --------
     >>> x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
-    >>> image, moved = (np.rint(120 + 60 * np.sin(0.5 * (x - a)) + 50 * np.cos(0.4 * (y + a))).astype(np.uint8)
+    >>> image, moved = (np.rint(120 + 60 * np.sin((x - a) / 2) + 50 * np.cos((y + a) / 2)).astype(np.uint8)
     ...                 for a in (0.0, 0.3))
     >>> from vslam_ref.features import templates
     >>> refine(moved, templates.cut(image, [[14, 15]]).patch, [[14.0, 15.0]]).uv.round(1)

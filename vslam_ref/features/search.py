@@ -1,4 +1,4 @@
-r"""Which corner near a predicted place looks like the template?
+r"""The corner near a predicted place that looks most like a template.
 
 Two measures, both blind to a change of brightness, lowest best:
 
@@ -36,13 +36,13 @@ class Found(NamedTuple):
 
     Attributes
     ----------
-    index : ndarray of int64, shape (N,)
+    corner : ndarray of int64, shape (N,)
         Number among the corners; -1 where none was within the radius, or none good enough.
     cost : ndarray, shape (N,)
         ZMSSD, or 1 - ZNCC, of the best corner within the radius, accepted or not; infinity where none was.
     """
 
-    index: IntArray
+    corner: IntArray
     cost: Array
 
 
@@ -149,7 +149,7 @@ def search(
     >>> found = corners.detect(image)
     >>> template = templates.cut(image, found.xy[50:51])
     >>> search(image, found, template.patch, found.xy[50:51] + [2.0, -1.0], 4.0)
-    Found(index=array([50]), cost=array([0.]))
+    Found(corner=array([50]), cost=array([0.]))
     """
     whole = grey("image", image)
     if measure not in MEASURES:
@@ -244,7 +244,10 @@ def _costs(a: Bytes, b: Bytes, pairs: _Pairs, correlate: bool) -> Array:
     sum_a, sum_b = (_as_integers(v.sum(1)) for v in (p, q))
     square_a, square_b = (_as_integers(np.einsum("pk,pk->p", v, v)) for v in (p, q))
     if correlate:
-        size_a, size_b = ((AREA * s - m * m).astype(np.float64) for s, m in ((square_a, sum_a), (square_b, sum_b)))
+        size_a, size_b = (
+            (AREA * square - total**2).astype(np.float64)
+            for square, total in ((square_a, sum_a), (square_b, sum_b))
+        )
         size = np.sqrt(size_a[of_a] * size_b[of_b])
         product = (AREA * cross - sum_a[of_a] * sum_b[of_b]).astype(np.float64)
         return 1.0 - np.divide(product, size, out=np.zeros(len(size)), where=size > 0)  # eq-zncc

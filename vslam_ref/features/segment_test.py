@@ -113,7 +113,7 @@ def corner_score(image: ArrayLike, xy: ArrayLike, arc: int = 10) -> IntArray:
 
 
 def pixels(xy: ArrayLike, shape: tuple[int, int], before: int, after: int) -> Pixels:
-    """Check whole pixels (n, 2) that need ``before`` pixels to the left and above, ``after`` on the other sides.
+    """Check whole pixels (n, 2) with ``before`` pixels to the left and above, ``after`` on the other sides.
 
     Raises
     ------
@@ -127,8 +127,8 @@ def pixels(xy: ArrayLike, shape: tuple[int, int], before: int, after: int) -> Pi
     inside = (at >= before).all(1) & (at < np.array(shape[::-1]) - after).all(1)
     if not inside.all():
         raise ValueError(
-            f"pixel {tuple(at[~inside][0].tolist())} of an image of {shape[1]} x {shape[0]}: need {before} pixels "
-            f"before it and {after} behind"
+            f"pixel {tuple(at[~inside][0].tolist())} of an image of {shape[1]} x {shape[0]}: "
+            f"need {before} pixels before it and {after} behind"
         )
     return np.ascontiguousarray(at)
 
@@ -139,7 +139,7 @@ def _check(arc: int) -> None:
 
 
 def _best_arc(circle: Sequence[Levels], arc: int, near: Combine, far: Combine) -> Levels:
-    """``far`` over all arcs of ``near`` over the pixels of an arc; the one is the minimum, the other the maximum.
+    """``far`` over all arcs of ``near`` over an arc's pixels; one is the minimum, the other the maximum.
 
     Two arcs that begin at s - 1 and s share the arc - 1 pixels from s on: eight such middles, for odd s, do.
     """
