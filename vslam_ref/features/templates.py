@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
@@ -149,7 +149,7 @@ def cut(image: ArrayLike, xy: ArrayLike) -> Templates:
     return warp(image, at, np.broadcast_to(np.eye(2), (len(at), 2, 2)))
 
 
-def bilinear(flat: Bytes, width: int, x: Array, y: Array) -> Array:
+def bilinear(flat: NDArray[Any], width: int, x: Array, y: Array) -> Array:
     """Grey levels between pixels of an image in rows (H * width,); x and y must lie inside."""
     height = len(flat) // width
     i, j = np.minimum(y.astype(np.int64), height - 2), np.minimum(x.astype(np.int64), width - 2)
@@ -170,7 +170,7 @@ def _warp(flat: Bytes, width: int, uv: Array, M: Array) -> tuple[Bytes, BoolArra
     dx, dy = np.tile(step, SIDE), np.repeat(step, SIDE)
     x = uv[:, 0, None] + (M[:, 0, 0, None] * dx + M[:, 0, 1, None] * dy)  # eq-warp
     y = uv[:, 1, None] + (M[:, 1, 0, None] * dx + M[:, 1, 1, None] * dy)
-    inside = ((x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)).all(1)
+    inside = np.asarray(((x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)).all(1))
     patch = np.zeros((len(uv), SIDE * SIDE), np.uint8)
     patch[inside] = np.floor(bilinear(flat, width, x[inside], y[inside]) + 0.5)
     return patch, inside
