@@ -26,9 +26,7 @@ def plain_score(image: Bytes, x: int, y: int, arc: int) -> int:
 
     The 16 pixels are those whose distance from the centre rounds to 3, in the order of their angles.
     """
-    ring = [
-        (dx, dy) for dx in range(-3, 4) for dy in range(-3, 4) if round(float(np.hypot(dx, dy))) == 3
-    ]
+    ring = [(dx, dy) for dx in range(-3, 4) for dy in range(-3, 4) if round(float(np.hypot(dx, dy))) == 3]
     ring.sort(key=lambda p: np.arctan2(p[1], p[0]))
     assert len(ring) == 16
     difference = [int(image[y + dy, x + dx]) - int(image[y, x]) for dx, dy in ring]

@@ -38,7 +38,9 @@ def test_whole_pixels_are_cut_out_as_they_are(wall: Bytes) -> None:
 
 def test_what_leaves_the_image_is_marked(wall: Bytes) -> None:
     height, width = wall.shape
-    outside = np.array([[3.9, 50], [50, 3.9], [width - 3.9, 50], [50, height - 3.9], [np.nan, 50], [1e9, 1e9]])
+    outside = np.array(
+        [[3.9, 50], [50, 3.9], [width - 3.9, 50], [50, height - 3.9], [np.nan, 50], [1e9, 1e9]]
+    )
     found = warp(wall, outside, np.broadcast_to(np.eye(2), (6, 2, 2)))
     assert not found.inside.any()
     assert not found.patch.any()
@@ -83,7 +85,18 @@ def test_source_levels_count_against_target_levels() -> None:
 
 @pytest.mark.parametrize(
     ("area", "level"),
-    [(0.2, -1), (0.25, 0), (1.0, 0), (2.9, 0), (3.1, 1), (11.9, 1), (12.1, 2), (190.0, 3), (193.0, -1), (-1.0, -1)],
+    [
+        (0.2, -1),
+        (0.25, 0),
+        (1.0, 0),
+        (2.9, 0),
+        (3.1, 1),
+        (11.9, 1),
+        (12.1, 2),
+        (190.0, 3),
+        (193.0, -1),
+        (-1.0, -1),
+    ],
 )
 def test_levels_are_chosen_by_area_as_in_ptam(area: float, level: int) -> None:
     """PTAM: while the area exceeds 3, go one level up and divide it by 4; refuse below a quarter."""

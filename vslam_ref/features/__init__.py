@@ -19,7 +19,7 @@ top-left pixel; whole ones are called ``xy``, others ``uv``.  This room reads no
 """
 
 from vslam_ref.features.corners import Corners, detect, is_peak, shi_tomasi
-from vslam_ref.features.follow import Followed, follow
+from vslam_ref.features.follow import Followed, View, follow
 from vslam_ref.features.pyramid import finest_from_level, halve, level_from_finest, level_sigma, pyramid
 from vslam_ref.features.refine import Refined, State, refine
 from vslam_ref.features.search import Found, search, zmssd, zncc
@@ -36,6 +36,7 @@ __all__ = [
     "SmallImage",
     "State",
     "Templates",
+    "View",
     "corner_score",
     "cut",
     "detect",

@@ -147,7 +147,7 @@ def _model(patch: Bytes) -> _Model:
     is_flat = smaller <= LEAST_SLOPE * INNER * INNER
     det = np.where(is_flat, 1.0, a * c - b * b)
     inverse = np.stack([np.stack([c, -b], -1), np.stack([-b, a], -1)], -2) / det[:, None, None]
-    return _Model(T[:, 1:-1, 1:-1].reshape(len(T), -1), g, inverse, is_flat)
+    return _Model(T[:, 1:-1, 1:-1].reshape(len(T), INNER * INNER), g, inverse, is_flat)
 
 
 @accelerated("features:refine")
