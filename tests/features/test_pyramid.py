@@ -1,4 +1,4 @@
-"""Pyramids against OpenCV's area means, and positions on levels against a picture whose value is its position."""
+"""Pyramids against OpenCV's area means, and levels' positions against a picture that shows its position."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
 """Refinement on pictures whose shift is known because they are drawn from a formula.
 
-The bound.  At the answer u the equations say sum (g - mean g)(T(d) - B(u + d)) = 0, B the interpolated image.
-With f the true grey levels and e the error of u, T - B = (T - f) - (B - f) - grad f . e to first order.  Call
-the first two terms eps (36 numbers, their mean taken off): e = S^-1 sum (g - mean g) eps, and as S is the Gram
-matrix of the slopes, |e| <= |eps| / sqrt(smallest eigenvalue of S).  The test computes eps with the formula and
-SciPy's interpolation at the true place.  Slopes from differences are off by (0.7)^2 / 6 = 8 % at
-most, second-order terms by about as much: |e| may be 1.25 times the bound, and 0.01 more, as the iteration ends
-with a step below 0.01.
+The bound.  At the answer u the equations say sum (g - mean g)(T(d) - B(u + d)) = 0, B the interpolated
+image.  With f the true grey levels and e the error of u, T - B = (T - f) - (B - f) - grad f . e to first
+order.  Call the first two terms eps (36 numbers, their mean taken off): e = S^-1 sum (g - mean g) eps.  S is
+the Gram matrix of the slopes, so |e| <= |eps| / sqrt(smallest eigenvalue of S).  The test computes eps with
+the formula and SciPy's interpolation at the true place.  Slopes from differences are off by (0.7)^2 / 6 = 8 %
+at most, second-order terms by about as much: |e| may be 1.25 times the bound, and 0.01 more, as the iteration
+ends with a step below 0.01.
 """
 
 from __future__ import annotations
@@ -45,10 +45,8 @@ class Waves:
 
     def draw(self, shift: Array, offset: float = 0.0) -> Bytes:
         y, x = np.mgrid[0:60, 0:64].astype(float)
-        drawn: Bytes = np.rint(np.clip(self.at(np.stack([x, y], -1) - shift) + offset, 0, 255)).astype(
-            np.uint8
-        )
-        return drawn
+        grey = self.at(np.stack([x, y], -1) - shift) + offset
+        return np.rint(np.clip(grey, 0, 255)).astype(np.uint8)
 
 
 def bound(waves: Waves, image: Bytes, shift: Array, offset: float) -> float:
@@ -126,7 +124,7 @@ def test_a_patch_that_wanders_is_given_up() -> None:
 def test_noise_moves_it_as_much_as_the_matrix_says() -> None:
     """Covariance sigma^2 S^-1: the mean of e^T S e / sigma^2 over n places is 2, its deviation 2 / sqrt(n).
 
-    The template's own rounding adds 1/12, interpolation lowers the image's noise; at whole places it does not.
+    The template's own rounding adds 1/12; interpolation lowers noise, but not at whole places.
     Band: four deviations, and 15 % for slopes that are differences.
     """
     waves, sigma, rng = Waves(11), 3.0, np.random.default_rng(5)

@@ -1,4 +1,4 @@
-"""Comparing patches: OpenCV's matchTemplate at all places, and the nearest look-alike by trying all corners."""
+"""Comparing patches: OpenCV's matchTemplate at all places, and the best corner by trying all of them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_costs_at_all_places_are_opencvs(measure: str, wall: Bytes) -> None:
 @pytest.mark.parametrize("measure", ["zmssd", "zncc"])
 @pytest.mark.parametrize("radius", [0.0, 2.5, 5.0, 9.7])
 def test_the_best_corner_by_trying_all(measure: str, radius: float, wall: Bytes) -> None:
-    """Every corner, its distance and its cost from the definition.  Whole radii with whole places touch corners.
+    """Every corner, its distance and its cost from the definition; whole radii at whole places touch corners.
 
     All sums are integers and exact; the definition's own rounding is some 200 eps of its largest sum.
     """

@@ -1,4 +1,4 @@
-"""FAST by brute force at every pixel, and OpenCV's FAST-9, recorded and live: sets of pixels are equal or not."""
+"""FAST by brute force at every pixel, and OpenCV's FAST-9, recorded and live: the same pixels, or not."""
 
 from __future__ import annotations
 

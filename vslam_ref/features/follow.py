@@ -1,8 +1,8 @@
 """Patches followed from one image to the next, and back again as a check.
 
 A patch is cut out of the first image around a point, looked for among the corners of the second, and refined
-there.  Then the same is done backwards: the patch cut out of the second image is looked for among the corners of
-the first.  If another corner of the first image looks more like it than the one where the point was, the
+there.  Then the same is done backwards: the patch cut out of the second image is looked for among the corners
+of the first.  If another corner of the first image looks more like it than the one where the point was, the
 match is refused.
 """
 

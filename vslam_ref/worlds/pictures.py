@@ -104,7 +104,8 @@ def picture(
         if rng is None:
             raise ValueError(f"noise is {noise}: need a generator rng to draw it")
         canvas += noise * rng.standard_normal(canvas.shape)
-    return np.floor(np.clip(canvas, 0, 255) + 0.5).astype(np.uint8)
+    drawn: Bytes = np.floor(np.clip(canvas, 0, 255) + 0.5).astype(np.uint8)
+    return drawn
 
 
 def _cover(corner: Array, x: NDArray[np.int64], y: NDArray[np.int64], blur: float) -> Array:
