@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("backend")
 
 
 def test_it_is_scipys_linear_interpolation(wall: Bytes) -> None:
-    """Before rounding both are right to some 10 eps of 255: only a value so near to a half may round apart."""
+    """Before rounding both are right to some 10 eps of 255: only near a half may they round apart."""
     rng = np.random.default_rng(0)
     uv, M = rng.uniform(20, 200, (300, 2)), np.eye(2) + rng.normal(0, 0.4, (300, 2, 2))
     step = np.arange(8) - 4.0
