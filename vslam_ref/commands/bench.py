@@ -16,6 +16,7 @@ SUITES = {
     "filters": "vslam_ref.bench.filters",
     "bundle": "vslam_ref.bench.bundle",
     "grids": "vslam_ref.bench.grids",
+    "features": "vslam_ref.bench.features",
 }
 """Name -> module with ``run(quick) -> dict``; its ``rows``, a list of flat dicts, is printed as a table."""
 

@@ -17,7 +17,10 @@ class Paired(NamedTuple):
 
 
 def paired(
-    things: Mapping[str, Callable[[], object]], repeats: int = 9, least_seconds: float = 0.02
+    things: Mapping[str, Callable[[], object]],
+    repeats: int = 9,
+    least_seconds: float = 0.02,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> Paired:
     """Time the things in turn, ``repeats`` times; each measurement lasts at least ``least_seconds``.
 
@@ -29,19 +32,21 @@ def paired(
         Paired measurements.
     least_seconds : float
         A quick call is repeated within one measurement until it lasts this long.
+    clock : callable
+        Seconds; ``time.thread_time`` leaves out what else the machine does.
     """
     loops = {}
     for name, call in things.items():
         call()  # compile, fill caches
-        loops[name] = max(1, int(np.ceil(least_seconds / max(_measure(call, 1), 1e-9))))
-    rows = [[_measure(call, loops[name]) for name, call in things.items()] for _ in range(repeats)]
+        loops[name] = max(1, int(np.ceil(least_seconds / max(_measure(call, 1, clock), 1e-9))))
+    rows = [[_measure(call, loops[name], clock) for name, call in things.items()] for _ in range(repeats)]
     seconds = np.array(rows)  # (repeats, things)
     medians, ratios = np.median(seconds, 0).tolist(), np.median(seconds / seconds[:, :1], 0).tolist()
     return Paired(dict(zip(things, medians, strict=True)), dict(zip(things, ratios, strict=True)))
 
 
-def _measure(call: Callable[[], object], loops: int) -> float:
-    start = time.perf_counter()
+def _measure(call: Callable[[], object], loops: int, clock: Callable[[], float]) -> float:
+    start = clock()
     for _ in range(loops):
         call()
-    return (time.perf_counter() - start) / loops
+    return (clock() - start) / loops
