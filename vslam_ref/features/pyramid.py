@@ -50,6 +50,8 @@ def grey(name: str, image: ArrayLike, least: int = 1) -> Bytes:
 def pyramid(image: ArrayLike, levels: int = LEVELS) -> tuple[Bytes, ...]:
     """All levels of an image, the finest first.
 
+    Implements the scale space of A fig 2.1.
+
     Parameters
     ----------
     image : array_like of uint8, shape (H, W)

@@ -112,7 +112,7 @@ def search(
 ) -> Found:
     """Find for each template the corner within a radius that looks most like it.
 
-    Implements :eq:`eq-zmssd-sums`, and :eq:`eq-zncc` from the same sums.
+    Implements :eq:`eq-zmssd-sums`, and :eq:`eq-zncc` from the same sums: the patch search of A fig 2.1.
 
     Parameters
     ----------

@@ -47,6 +47,20 @@ def painted_wall(rng: np.random.Generator, pieces: int = 700, size: tuple[int, i
     return Wall(vertex, rng.uniform(0, 255, pieces))
 
 
+def house_front(rng: np.random.Generator, closed: float = 0.2) -> tuple[Wall, Wall]:
+    """Rows of windows that differ in brightness only, and the same front with some of them walled up.
+
+    24 x 18 windows, 12 pixels apart, the first one around pixel (20, 20); ``closed`` is the share of those that
+    the second front lacks.
+    """
+    j, i = np.indices((18, 24)).reshape(2, -1)
+    pane = np.array([[-2.0, -3.0], [2.0, -3.0], [2.0, 3.0], [-2.0, 3.0]])
+    vertex = 20.0 + 12.0 * np.stack([i, j], 1)[:, None] + pane
+    grey = rng.uniform(0, 255, len(vertex))
+    kept = rng.random(len(vertex)) >= closed
+    return Wall(vertex, grey), Wall(vertex[kept], grey[kept])
+
+
 def moved(H_b_a: ArrayLike, uv: ArrayLike) -> Array:
     """Pixels (..., 2) of the second picture from those of the first, through the homography (3, 3)."""
     H, at = as_array("H_b_a", H_b_a, 3, 3), as_array("uv", uv, 2)

@@ -25,7 +25,8 @@ def _warp(image: Array, uv: Array, M: Array) -> Array:
     found = warp(_bytes(image), uv[None], M[None])
     if not found.inside[0]:
         raise ValueError("the patch leaves the image")
-    return found.patch[0]
+    patch: Array = found.patch[0]
+    return patch
 
 
 TABLE: Answers = {
