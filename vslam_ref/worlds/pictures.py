@@ -50,8 +50,8 @@ def painted_wall(rng: np.random.Generator, pieces: int = 700, size: tuple[int, i
 def house_front(rng: np.random.Generator, closed: float = 0.2) -> tuple[Wall, Wall]:
     """Rows of windows that differ in brightness only, and the same front with some of them walled up.
 
-    24 x 18 windows, 12 pixels apart, the first one around pixel (20, 20); ``closed`` is the share of those that
-    the second front lacks.
+    24 x 18 windows, 12 pixels apart, the first one around pixel (20, 20); ``closed`` is the share of those
+    that the second front lacks.
     """
     j, i = np.indices((18, 24)).reshape(2, -1)
     pane = np.array([[-2.0, -3.0], [2.0, -3.0], [2.0, 3.0], [-2.0, 3.0]])

@@ -11,6 +11,11 @@ SIGNS = "every entry is +1 or -1, its own reciprocal"
 
 EQUIVALENT: dict[tuple[str, str, str], str] = {
     (
+        "features.corners.shi_tomasi",
+        "at = pixels(xy, whole.shape, HALF + 1, HALF + 1)",
+        "+ to -",
+    ): "how near to the border a pixel may be: the vectors ask for the middle of an image only",
+    (
         "geometry.alignment.align",
         "rmse = float(np.sqrt(w @ np.sum(left**2, axis=1)))",
         "factors exchanged",

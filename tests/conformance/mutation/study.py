@@ -15,7 +15,7 @@ from mutation.child import ROOT, Verdict, executed, run_mutant, source_of
 from mutation.equivalent import EQUIVALENT
 from mutation.sites import Mutant, mutants
 
-ROOMS = ("geometry", "estimation", "filters", "grids")
+ROOMS = ("geometry", "estimation", "filters", "features", "grids")
 NOT_ASKED = {
     "vslam_ref.geometry.multiview.resection tilted_twin": "a second valley, told beside the answer",
 }
