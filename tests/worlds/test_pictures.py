@@ -10,9 +10,9 @@ from vslam_ref.worlds.pictures import Wall, house_front, moved, painted_wall, pi
 
 
 def test_the_centre_of_a_square_is_that_of_its_grey_levels() -> None:
-    """Moments of the picture: edges change linearly about the true edge, so area and centre are kept.
+    """Edges change linearly over two pixels about the true edge: area and centre are kept.
 
-    Rounding to whole grey levels: at most half a level at some 60 pixels of the border, of 100 inside.
+    Rounding to whole grey levels: at most half a level at 80 pixels of the border.
     """
     low, high = np.array([7.3, 9.8]), np.array([17.3, 19.8])
     corner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])

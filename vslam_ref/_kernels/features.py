@@ -7,9 +7,9 @@ number of bytes apart, each pixel walks around its circle counting, and 32 of th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from vslam_ref._kernels._signature import given, kernel, made
+from vslam_ref._kernels._signature import given, kernel, njit
 
 CIRCLE_X = np.array([0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1])
 CIRCLE_Y = np.array([3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1, 0, 1, 2, 3])
@@ -27,6 +27,7 @@ PATCHES = types.Array(types.uint8, 2, "C", readonly=True)
 NEW_BYTES = types.Array(types.uint8, 1, "C")
 NEW_PIXELS = types.Array(types.int32, 2, "C")
 NEW_INTEGERS = types.Array(types.int64, 1, "C")
+NUMBERS = types.Array(types.float64, 1, "C")
 NEW_PATCHES = types.Array(types.uint8, 2, "C")
 
 
@@ -134,7 +135,7 @@ def corner_score(flat, width, xy, arc):
     return score
 
 
-@kernel(BYTES, types.int64, PIXELS, returns=made(1))
+@kernel(BYTES, types.int64, PIXELS, returns=NUMBERS)
 def shi_tomasi(flat, width, xy):
     """Twin of :func:`vslam_ref.features.corners._shi_tomasi`."""
     smaller = np.empty(xy.shape[0])
@@ -223,13 +224,13 @@ def _sums(flat, width, at):
 
 @njit(cache=True)
 def _cross(template, flat, width, at):
-    """Sum of the products of a template and the patch around a pixel."""
-    total = np.int32(0)
+    """Sum of the products of a template and the patch around a pixel: below 2^24, exact in single precision."""
+    total = np.float32(0)
     for j in range(SIDE):
-        row = flat[at + (j - BEFORE) * width - BEFORE : at + (j - BEFORE) * width + AFTER + 1]
-        mine = template[j * SIDE : (j + 1) * SIDE]
+        first = np.uint64(at + (j - BEFORE) * width - BEFORE)  # unsigned: never counted from the end
         for i in range(SIDE):
-            total = np.int32(total + np.int32(row[i]) * np.int32(mine[i]))
+            level = np.float32(flat[first + np.uint64(i)])
+            total += level * np.float32(template[np.uint64(j * SIDE + i)])
     return np.int64(total)
 
 
@@ -265,7 +266,7 @@ def _corner_sums(flat, width, xy):
     given(2),
     given(1),
     types.boolean,
-    returns=types.Tuple((NEW_INTEGERS, types.Array(types.float64, 1, "C"))),
+    returns=types.Tuple((NEW_INTEGERS, NUMBERS)),
 )
 def search(flat, width, xy, row_start, patch, uv, radius, correlate):
     """Twin of :func:`vslam_ref.features.search._search`."""
@@ -328,7 +329,7 @@ def _one_step(flat, width, height, u, v, T, gx, gy):
     types.int64,
     PATCHES,
     given(2),
-    returns=types.Tuple((made(2), made(1), types.Array(types.int8, 1, "C"))),
+    returns=types.Tuple((types.Array(types.float64, 2, "C"), NUMBERS, types.Array(types.int8, 1, "C"))),
 )
 def refine(flat, width, patch, uv):
     """Twin of :func:`vslam_ref.features.refine._refine`."""

@@ -27,7 +27,6 @@ from threadpoolctl import threadpool_limits
 from vslam_ref import _kernels
 from vslam_ref.arrays import Array
 from vslam_ref.bench.rows import row
-from vslam_ref.support.timing import paired
 from vslam_ref.datasets import catalogue, pictures
 from vslam_ref.features import (
     Corners,
@@ -41,6 +40,7 @@ from vslam_ref.features import (
     warp,
 )
 from vslam_ref.features.pyramid import Bytes
+from vslam_ref.support.timing import paired
 from vslam_ref.worlds.pictures import painted_wall, picture
 
 THRESHOLD, POINTS, RADIUS = 10, 1000, 10.0

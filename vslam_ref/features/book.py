@@ -63,7 +63,7 @@ def between(image: Bytes, x: float, y: float) -> float:
 
 
 def warped_patch(image: Bytes, u: Array, M: Array) -> Bytes:
-    """Patch of 8 x 8 pixels around u, each pixel of it M wide in the image."""
+    """Patch of 8 x 8 pixels around the pixel u (2,), each pixel of it M (2, 2) pixels wide in the image."""
     patch = np.zeros((8, 8), np.uint8)
     for i in range(8):
         for j in range(8):
@@ -79,24 +79,25 @@ def zmssd(A: Bytes, B: Bytes) -> float:
 
 
 def best_corner(image: Bytes, corners: list[tuple[int, int]], T: Bytes, u: Array, radius: float) -> int:
-    """Number of the corner within the radius that looks most like the template; -1 without one."""
+    """Number of the corner within the radius of u (2,), pixels, that looks most like T; -1 without one."""
     best, least = -1, np.inf
     for number, (x, y) in enumerate(corners):
         patch = image[y - 4 : y + 4, x - 4 : x + 4] if min(x, y) >= 4 else image[:0]
-        if patch.shape == (8, 8) and np.hypot(x - u[0], y - u[1]) <= radius and zmssd(T, patch) < least:
-            best, least = number, zmssd(T, patch)
+        if patch.shape == (8, 8) and np.hypot(x - u[0], y - u[1]) <= radius:
+            cost = zmssd(T, patch)  # eq-zmssd
+            best, least = (number, cost) if cost < least else (best, least)
     return best
 
 
 class Step(NamedTuple):
-    """Where the patch lies after a step, and its offset of brightness."""
+    """Pixel u (2,) where the patch lies after a step, and its offset of brightness b, grey levels."""
 
     u: Array
     b: float
 
 
 def refine_step(image: Bytes, T: Bytes, u: Array, b: float) -> Step:
-    """One inverse compositional step from place u and offset b, with three unknowns."""
+    """One inverse compositional step from pixel u (2,) and offset b, grey levels: three unknowns."""
     H, gradient = np.zeros((3, 3)), np.zeros(3)
     for i in range(1, 7):
         for j in range(1, 7):

@@ -150,7 +150,7 @@ def cut(image: ArrayLike, xy: ArrayLike) -> Templates:
 
 
 def bilinear(flat: NDArray[Any], width: int, x: Array, y: Array) -> Array:
-    """Grey levels between pixels of an image in rows (H * width,); x and y must lie inside."""
+    """Grey levels (...) between pixels x, y (...) inside an image ``flat`` (H * width,) in rows."""
     height = len(flat) // width
     i, j = np.minimum(y.astype(np.int64), height - 2), np.minimum(x.astype(np.int64), width - 2)
     fx, fy = x - j, y - i

@@ -1,6 +1,6 @@
 """Pictures with a known second view: a flat wall of painted quadrilaterals, seen through a homography.
 
-Every edge is a straight line whose grey level changes over about one pixel, so that the picture has no jagged
+Every edge is a straight line whose grey level changes over two pixels, so that the picture has no jagged
 corners.  A second picture of the same wall is drawn from the wall, not warped from the first picture: where a
 point of the first one lies in the second is known exactly.
 """
@@ -73,7 +73,7 @@ def picture(
     H_b_a: ArrayLike | None = None,
     *,
     size: tuple[int, int] = (640, 480),
-    blur: float = 1.5,
+    blur: float = 2.0,
     noise: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> Bytes:
@@ -87,7 +87,7 @@ def picture(
     size : tuple of int
         Width and height.
     blur : float
-        Pixels over which an edge changes.
+        Pixels over which an edge changes.  A whole number keeps areas: pixels sample the edge evenly.
     noise : float
         Standard deviation of independent noise, grey levels.
     rng : numpy.random.Generator, optional
