@@ -224,13 +224,13 @@ def _sums(flat, width, at):
 
 @njit(cache=True)
 def _cross(template, flat, width, at):
-    """Sum of the products of a template and the patch around a pixel: below 2^24, exact in single precision."""
-    total = np.float32(0)
+    """Sum of the products of a template and the patch around a pixel."""
+    total = np.int32(0)
     for j in range(SIDE):
         first = np.uint64(at + (j - BEFORE) * width - BEFORE)  # unsigned: never counted from the end
         for i in range(SIDE):
-            level = np.float32(flat[first + np.uint64(i)])
-            total += level * np.float32(template[np.uint64(j * SIDE + i)])
+            level = np.int32(flat[first + np.uint64(i)])
+            total = np.int32(total + level * np.int32(template[np.uint64(j * SIDE + i)]))
     return np.int64(total)
 
 
