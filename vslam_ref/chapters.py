@@ -59,7 +59,7 @@ CHAPTERS = (
     Chapter(5, "Levenberg-Marquardt", "Estimation", "estimation/least_squares", "05_least_squares"),
     Chapter(6, "Bundle adjustment", "Estimation", "estimation/bundle", "06_bundle_adjustment"),
     Chapter(7, "Camera calibration", "Estimation", "estimation/calibration", "07_calibration"),
-    Chapter(8, "Image features", "From images to a map", "features"),
+    Chapter(8, "Image features", "From images to a map", "features", "08_features"),
     Chapter(9, "Two views", "From images to a map", "geometry/multiview/two_views"),
     Chapter(10, "Tracking", "From images to a map", "systems/ptam/tracker"),
     Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper"),
