@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vslam_ref.features.corners import Corners, detect, in_rows
+from vslam_ref.features.refine import refine
 from vslam_ref.features.search import search, variation, zmssd, zncc
 from vslam_ref.features.templates import cut
 
@@ -126,6 +127,15 @@ def test_flat_patches_correlate_with_nothing() -> None:
     assert found.corner.tolist() == [-1]
 
 
+def test_nothing_is_found_near_places_that_are_none(wall: Bytes) -> None:
+    patch = np.repeat(cut(wall, [[60, 60]]).patch, 4, 0)
+    places = [[np.nan, 60], [60, np.nan], [np.inf, 60], [60, -1e300]]
+    found = search(wall, detect(wall), patch, places, 5.0)
+    assert (found.corner == -1).all()
+    assert np.isinf(found.cost).all()
+    assert not refine(wall, patch, places).ok.any()
+
+
 def test_no_corners_and_no_templates_are_no_error(wall: Bytes) -> None:
     none = in_rows(np.zeros((0, 2), np.int32), wall.shape)
     assert search(wall, none, cut(wall, [[60, 60]]).patch, [[60, 60]], 5.0).corner.tolist() == [-1]
@@ -140,9 +150,12 @@ def test_no_corners_and_no_templates_are_no_error(wall: Bytes) -> None:
         ({"patch": np.zeros((2, 8, 8), np.uint8)}, r"need uint8 \(N, 8, 8\)"),
         ({"patch": np.zeros((1, 8, 8))}, "templates are float64"),
         ({"image": np.zeros((30, 30), np.uint8)}, "need one shape"),
+        ({"radius": np.inf}, "radius is inf"),
+        ({"radius": -1.0}, "radius is -1"),
+        ({"radius": np.nan}, "radius is nan"),
     ],
 )
 def test_what_does_not_fit_is_refused(change: dict[str, object], told: str, wall: Bytes) -> None:
     given = {"image": wall, "corners": detect(wall), "patch": cut(wall, [[60, 60]]).patch, "uv": [[60, 60]]}
     with pytest.raises(ValueError, match=told):
-        search(**{**given, "radius": 5.0, **change})  # type: ignore[arg-type]
+        search(**{"radius": 5.0, **given, **change})  # type: ignore[arg-type]

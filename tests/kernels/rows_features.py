@@ -98,7 +98,7 @@ ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "features:segment_test": [for_segment_test],
     "features:corner_score": [for_corner_score],
     "features:shi_tomasi": [for_shi_tomasi],
-    "features:warp": [for_warp],
-    "features:search": [for_zmssd, for_zncc],
-    "features:refine": [for_refine],
+    "patches:warp": [for_warp],
+    "patches:search": [for_zmssd, for_zncc],
+    "patches:refine": [for_refine],
 }

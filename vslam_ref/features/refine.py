@@ -150,7 +150,7 @@ def _model(patch: Bytes) -> _Model:
     return _Model(T[:, 1:-1, 1:-1].reshape(len(T), INNER * INNER), g, inverse, is_flat)
 
 
-@accelerated("features:refine")
+@accelerated("patches:refine")
 def _refine(flat: Bytes, width: int, patch: Bytes, uv: Array) -> tuple[Array, Array, NDArray[np.int8]]:
     """Places (N, 2), offsets (N,) and states (N,) of templates (N, 64)."""
     height, model = len(flat) // width, _model(patch)

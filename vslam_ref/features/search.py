@@ -27,6 +27,7 @@ from vslam_ref.features.templates import AFTER, BEFORE, SIDE
 
 MEASURES = ("zmssd", "zncc")
 AREA = SIDE * SIDE
+LARGEST_RADIUS = 1e4
 LIMIT = 0.5
 """Largest accepted cost, over the template's own variation: an absolute limit would depend on contrast."""
 
@@ -123,7 +124,7 @@ def search(
     patch : array_like of uint8, shape (N, 8, 8)
         Of :func:`~vslam_ref.features.templates.warp`.
     uv : array_like, shape (N, 2)
-        Predicted places, in pixels of the level.
+        Predicted places, in pixels of the level; near one that is not finite nothing is found.
     radius : array_like, shape () or (N,)
         Pixels of the level.
     limit : array_like, shape () or (N,)
@@ -140,7 +141,7 @@ def search(
     Raises
     ------
     ValueError
-        If image, corners and templates do not fit, or the measure is unknown.
+        If image, corners and templates do not fit, the measure is unknown, or a radius is out of range.
 
     Examples
     --------
@@ -165,6 +166,10 @@ def search(
         )
     flat = np.ascontiguousarray(given).reshape(-1, AREA)
     reach = np.broadcast_to(np.asarray(radius, np.float64), len(at))
+    if not ((reach >= 0) & (reach < LARGEST_RADIUS)).all():
+        raise ValueError(f"radius is {radius!r}: need 0 to {LARGEST_RADIUS:g} pixels")
+    somewhere = np.isfinite(at) & (np.abs(at) < 1e9)
+    at = np.where(somewhere.all(-1, keepdims=True), at, -2 * LARGEST_RADIUS)  # where no corner can be
     index, cost = _search(
         whole.reshape(-1), whole.shape[1], corners.xy, corners.row_start, flat, at, reach, measure == "zncc"
     )
@@ -199,7 +204,7 @@ def _within(width: int, xy: Pixels, uv: Array, radius: Array) -> _Pairs:
     return _Pairs(np.repeat(np.arange(len(uv)), count.sum(1)), start + np.arange(len(start)))
 
 
-@accelerated("features:search")
+@accelerated("patches:search")
 def _search(
     flat: Bytes,
     width: int,

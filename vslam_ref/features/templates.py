@@ -162,7 +162,7 @@ def bilinear(flat: NDArray[Any], width: int, x: Array, y: Array) -> Array:
     return level
 
 
-@accelerated("features:warp")
+@accelerated("patches:warp")
 def _warp(flat: Bytes, width: int, uv: Array, M: Array) -> tuple[Bytes, BoolArray]:
     """Patches (N, 64) of an image in rows (H * width,), and whether they were inside."""
     height = len(flat) // width
