@@ -126,7 +126,7 @@ def _halve(flat: Bytes, width: int) -> Bytes:
 def finest_from_level(uv: ArrayLike, level: Any) -> Array:
     """Pixels of level 0 from pixels of a level.
 
-    Implements :eq:`eq-half-pixel`.
+    Implements :eq:`eq-level-position`.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def finest_from_level(uv: ArrayLike, level: Any) -> Array:
 def level_from_finest(uv: ArrayLike, level: Any) -> Array:
     """Pixels of a level from pixels of level 0, the inverse of :func:`finest_from_level`.
 
-    Implements :eq:`eq-half-pixel`.
+    Implements :eq:`eq-level-position`.
 
     Parameters
     ----------

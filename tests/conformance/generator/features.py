@@ -201,7 +201,7 @@ def _levels(topic: Topic, rng: np.random.Generator) -> None:
     few = tolerance(4e-16, "a product by a power of two, and one sum", float32=1e-6)
     for name in ("features.finest_from_level", "features.level_from_finest"):
         cases = [_one_place(rng, name, 1 + k % 4) for k in range(12)]
-        topic.group(name, "eq-half-pixel", "fractions", few, cases)
+        topic.group(name, "eq-level-position", "fractions", few, cases)
 
 
 def _block(image: Image, x: int, y: int) -> int:
