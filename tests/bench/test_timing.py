@@ -29,7 +29,7 @@ def test_the_peer_computes_what_we_compute() -> None:
     pytest.importorskip("filterpy", reason="the peer is not installed")
     world = MappedVehicle(10)
     ours, theirs = array_step(world), filterpy_peer.filterpy_step(world, "stacked")
-    x_p, x_m, P_pp, P_pm, P_mm = ours.args[:5]
+    x_p, x_m, P_pp, P_pm, P_mm = _held(ours, "state")
     kalman = _held(_held(theirs, "predict"), "kalman")
     for _ in range(3):
         ours()
