@@ -2,13 +2,13 @@
 
 The rooms of the house stand on floors; each imports only from floors below::
 
-    6  cli, commands, experiments, bench     what a person runs
-    5  plot, datasets                        pictures; foreign formats
-    4  systems                               (later chapters)
-    3  worlds                                simulators with exact truth
-    2  filters, metrics                      estimators; how good they are
-    1  geometry                              rotations and rigid motions
-    0  _kernels                              Numba twins of hot loops
+    6  cli, commands, experiments, bench, conformance    what a person runs
+    5  plot, datasets                                    pictures; foreign formats
+    4  systems                                           whole methods on recorded data
+    3  grids, worlds                                     maps of cells; simulators with exact truth
+    2  estimation, filters, metrics                      estimators; how good they are
+    1  geometry, interop                                 rotations, motions, cameras; other conventions
+    0  _kernels, arrays, support, chapters               Numba twins of hot loops; what all rooms use
 
 The NumPy function is the text and the truth.  ``VSLAM_REF_BACKEND=auto|numpy|numba`` chooses
 whether a hot loop runs as its Numba twin.

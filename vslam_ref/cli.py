@@ -25,6 +25,7 @@ from types import ModuleType
 from typing import NoReturn
 
 import vslam_ref
+from vslam_ref._kernels import backend
 from vslam_ref.commands import (
     ba,
     bench,
@@ -122,6 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal without the letter must not stop the work
     try:
         options = build_parser().parse_args(arguments)
+        backend()  # a misspelt VSLAM_REF_BACKEND is an error before the work, not after
         status: int = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status

@@ -110,6 +110,21 @@ def test_errors_that_are_not_the_users_are_not_hidden(error, monkeypatch):
         cli.main(["list"])
 
 
+def test_a_misspelt_backend_is_an_error_before_the_work():
+    done = subprocess.run(
+        [sys.executable, "-m", "vslam_ref", "list"],
+        capture_output=True, text=True, env=environment(VSLAM_REF_BACKEND="nunba"),
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "VSLAM_REF_BACKEND='nunba': must be one of auto, numpy, numba" in done.stderr
+
+
+def test_a_folder_without_data_sets_is_named(capsys, monkeypatch, tmp_path):
+    monkeypatch.setenv("VSLAM_REF_DATA", str(tmp_path))
+    assert cli.main(["list"]) == 0
+    assert capsys.readouterr().out.endswith(f"none; VSLAM_REF_DATA is {tmp_path}\n")
+
+
 def test_debugging_shows_the_traceback_of_bad_input(monkeypatch):
     monkeypatch.setenv("VSLAM_REF_DEBUG", "1")
     with pytest.raises(ValueError, match="unknown data set"):

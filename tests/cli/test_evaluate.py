@@ -167,6 +167,7 @@ def test_what_a_reader_of_the_numbers_should_know_is_noted(
         (["E", "T", "--plot", "p.pdf"], r"p\.pdf.*must end in \.png or \.svg"),
         (["E", "T", "--plot", "gone/p.svg"], "folder .*gone.* does not exist: make it first"),
         (["E", "T", "--json", "gone/x.json"], "folder .*gone.* does not exist: make it first"),
+        (["E", "T", "--json", "late.txt/x.json"], "folder 'late.txt' of file .* is a file: give a folder"),
         (["E", "late.txt"], "0 pairs of poses within 0.01 s: need 3; estimate 0.002 to 6.002 s, truth 1000"),
         (["E", "few.txt"], "2 pairs of poses within"),
         (["E", "kitti.txt"], "the truth has no times and the other has"),

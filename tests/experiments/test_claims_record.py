@@ -40,6 +40,11 @@ def test_the_sentence_ends_with_the_verdict_of_the_rule(holds, word):
     assert (claim.verdict, claim.sentence) == (word, f"x is 1: {word}.")
 
 
+def test_percent_signs_stand_apart_as_in_the_book():
+    claim = judged("a", "B", "t", "r", True, "78% of 95 % is 74.1%", {})
+    assert claim.sentence == "78 % of 95 % is 74.1 %: reproduced."
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -121,6 +121,21 @@ def test_all_results_of_the_folder_are_shown_and_unreadable_ones_named(out):
     assert shown.count("result.json cannot be read") == 6  # in the overview and in its section, three times
 
 
+def test_results_of_other_commands_are_left_out(out):
+    """``run`` and ``grid`` write a ``result.json`` too, in folders beside it when one follows the README."""
+    (out / "robot").mkdir()
+    (out / "robot" / "result.json").write_text('{"dataset": "mrclam", "rmse_position_m": 0.06}')
+    report.write_index(out)
+    assert "robot" not in page(out).text
+
+
+def test_seconds_are_read_without_an_exponent(out):
+    path = out / "toy" / "result.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "seconds": 2.3e-05}))
+    report.write_index(out)
+    assert "seconds 0.0." in page(out).text
+
+
 def test_an_empty_folder_gives_a_page(tmp_path):
     report.write_index(tmp_path)
     assert "All experiments" in page(tmp_path).text

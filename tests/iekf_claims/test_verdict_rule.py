@@ -15,7 +15,7 @@ from vslam_ref.experiments.iekf import (
     judge,
     rules_table,
 )
-from vslam_ref.experiments.iekf.measures import average, difference_factor, ratio
+from vslam_ref.experiments.iekf.measures import average, difference_factor, ratio, share_above_line
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.support.json_text import to_json
 
@@ -48,6 +48,24 @@ def test_all_three_conditions_are_needed(evaluation):
         claim = conclude(altered(good, **change))
         assert claim.verdict == "not reproduced"
         assert [k for k in ("true", "seen", "telling") if not claim.measured[k]] == [failing]
+
+
+def test_the_sentence_of_a_failed_claim_names_the_condition_that_failed(evaluation):
+    c = evaluation.threshold
+    good = altered(evaluation, held=85, interval=(c + 0.1, c + 1), null_rate=0.05)
+    assert "show B's picture: reproduced." in conclude(good).sentence
+    for words, change in (
+        ("do not settle on which side", {"interval": (c - 0.1, c + 1)}),
+        ("where 80 % are asked for", {"held": 79}),
+        ("but so do 40 % where it is false", {"null_rate": 0.4}),
+    ):
+        assert words in conclude(altered(good, **change)).sentence
+
+
+def test_the_bound_of_a_share_of_time_is_in_percent():
+    rule = Rule(("nees:iekf/high",), share_above_line("lap 1"), False, "consistent", False, 0.25)
+    assert "lies above the line 3.592 for 0% of lap 1" in rule.found(0.0)
+    assert rule.bound(0.25) == "the rule asks for at most 25%"
 
 
 def test_a_rule_that_cannot_say_no_tests_nothing(evaluation):

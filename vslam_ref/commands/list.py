@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import Any
 
 from vslam_ref.commands.options import add_json, json_target, write_json
@@ -38,11 +39,16 @@ def run(options: argparse.Namespace) -> int:
     found = content["data_sets_found"]
     rows = [[name, folder] for name, folder in found.items()]
     print("\nData sets found (vslam-ref data shows all)")
-    print(
-        table(["name", "folder"], rows) if rows else "none; set VSLAM_REF_DATA to the folder that holds them"
-    )
+    print(table(["name", "folder"], rows) if rows else _none_found())
     write_json(target, content)
     return 0
+
+
+def _none_found() -> str:
+    searched = os.environ.get("VSLAM_REF_DATA")
+    if searched:
+        return f"none; VSLAM_REF_DATA is {searched}"
+    return "none; set VSLAM_REF_DATA to the folder that holds them"
 
 
 def contents() -> dict[str, Any]:

@@ -57,6 +57,7 @@ def log_figure(
         for axes, p, name in ((panels[0], static, "S: what stays"), (panels[1], plain, "plain grid")):
             show_map(axes, p, extent)
             axes.set_title(name)
+            axes.tick_params(labelbottom=True)  # shared axes hide the numbers over which "x [m]" stands
         axes = panels[2]
         show_map(axes, 0.5 + 0.3 * (static - 0.5), extent)
         axes.plot(path_xy[:, 0], path_xy[:, 1], color=style.GREY, lw=0.6, label="robot")

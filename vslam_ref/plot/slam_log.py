@@ -109,6 +109,7 @@ def error_figure(runs: Mapping[str, Drawn], title: str) -> Figure | None:
             panel.set_title(_look(run.name).name)
         for panel in axes[-1]:
             panel.set_xlabel("time [s]")
+        style.legend_below(figure, axes[0, 0], 2)
         figure.suptitle(title, fontsize=12)
     return figure
 
@@ -122,8 +123,8 @@ def _error_row(panels: NDArray[np.object_], drawn: list[Drawn], component: int) 
         error, band = np.where(gaps, np.nan, error), np.where(gaps, np.nan, band)
         panel.axhline(0.0, color=TRUTH, lw=0.6)
         if np.isfinite(band).any():
-            panel.fill_between(run.times, -band, band, color=look.colour, alpha=0.18, lw=0, label="3σ")
-        panel.plot(run.times, error, color=look.colour, lw=0.9)
+            panel.fill_between(run.times, -band, band, color=look.colour, alpha=0.18, lw=0, label="±3σ")
+        panel.plot(run.times, error, color=look.colour, lw=0.9, label="error")
     name, unit = COMPONENTS[component]
     panels[0].set_ylabel(f"{name} [{unit}]")
     largest = max(float(np.nanmax(np.abs(run.errors[:, component]))) for run in drawn)

@@ -84,6 +84,8 @@ def require_parent(path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.is_dir():
         raise InputError(f"{str(target)!r} is a folder: give the name of a file")
+    if target.parent.exists() and not target.parent.is_dir():
+        raise InputError(f"folder {str(target.parent)!r} of file {str(target)!r} is a file: give a folder")
     if not target.parent.is_dir():
         raise InputError(
             f"folder {str(target.parent)!r} of file {str(target)!r} does not exist: make it first"

@@ -1,4 +1,4 @@
-"""Gains and noises of the data sets, as found by ``experiments.slam_log.identify`` without any truth.
+"""Gains and noises of the data sets, as found by ``vslam-ref identify`` without any truth.
 
 One JSON file a set: ``values`` (the fields of :class:`~vslam_ref.systems.slam_log.Calibration`),
 ``method``, ``evidence`` and the ``command`` that makes the file again.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
@@ -138,7 +139,7 @@ def judged(
         What was found, in plain words with numbers, without the verdict and the full stop.
     """
     outcome = verdict(None if holds is None else bool(holds))
-    sentence = f"{found}: {outcome}."
+    sentence = re.sub(r"(?<=\d)%", " %", f"{found}: {outcome}.")
     interval = None if ci is None else [float(end) for end in ci]
     if least_runs is None and (ci is not None or share is not None):
         least_runs = LEAST_FOR_EVERY_RUN if ci is None else LEAST_FOR_INTERVAL

@@ -32,8 +32,21 @@ def write_index(out: Path) -> Path:
 
 
 def result_folders(out: Path) -> list[Path]:
-    """Return the folders of ``out`` that hold a result, sorted by name; temporaries are left out."""
-    return sorted(p.parent for p in out.glob("*/result.json") if not p.parent.name.startswith("."))
+    """Return the folders of ``out`` that hold a result, sorted by name; temporaries are left out.
+
+    Left out are also the results of other commands (``vslam-ref run``, ``grid``), which are no experiments.
+    """
+    paths = sorted(p for p in out.glob("*/result.json") if not p.parent.name.startswith("."))
+    return [path.parent for path in paths if not _of_another_command(path)]
+
+
+def _of_another_command(path: Path) -> bool:
+    """Tell whether a readable result has nothing of an experiment's."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and not {"experiment", "claims", "assumptions"} & set(content)
 
 
 def read_result(folder: Path) -> dict[str, Any]:
@@ -90,7 +103,9 @@ def _section(result: Mapping[str, Any]) -> Html:
 
 def _body(result: Mapping[str, Any], title: str) -> list[Html]:
     at = quote(result["folder"])
-    facts = ", ".join(f"{key} {shown(result.get(key))}" for key in ("seed", "runs", "seconds"))
+    seconds = result.get("seconds")
+    time = f"{seconds:.1f}" if isinstance(seconds, float) else shown(seconds)
+    facts = f"seed {shown(result.get('seed'))}, runs {shown(result.get('runs'))}, seconds {time}"
     names = ("figure.svg", "figure.png", "result.json", "runs.npz")
     return [
         tag("p", f"{result.get('source', '')}. {facts}. ", links({n: f"{at}/{n}" for n in names})),

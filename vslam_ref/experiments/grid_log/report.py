@@ -141,8 +141,8 @@ def _film(path: Path) -> pages.Html | None:
     if not path.exists():
         return None
     words = (
-        ": S with D in red-orange and the ways of what moved in light blue, the plain grid beside it, the "
-        "robot in blue."
+        ": S with D in red-orange and the ways of what moved in light blue, the plain grid beside it or "
+        "below, the robot in blue."
     )
     film = pages.Html(f'<video src="{path.name}" controls muted loop playsinline></video><br>')
     return pages.tag("p", film, pages.links({path.name: path.name}), words)

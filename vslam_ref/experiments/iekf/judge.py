@@ -133,20 +133,26 @@ def conclude(e: Evaluation) -> Claim:
         measured["reason"] = _why_not(e, conditions)
     return judged(
         s.id, s.source, s.text, rule.text(), None if undecidable else all(conditions.values()),
-        _found(e, undecidable or (conditions["seen"] and not conditions["telling"])), measured,
+        _found(e, conditions), measured,
         ci=e.interval, null_rate=e.null_rate, share=e.share, runs=e.study_runs, least_runs=LEAST_STUDY,
     )  # fmt: skip
 
 
-def _found(e: Evaluation, vague: bool) -> str:
-    """Say what was found: the statistic of all runs, its bound, and how many studies show it."""
+def _found(e: Evaluation, conditions: Mapping[str, bool]) -> str:
+    """Say what was found: the statistic of all runs, its bound, how many studies show it, and the rest."""
     rule = e.sentence.rule
     size = "B's size" if e.study_runs == LEAST_STUDY else f"{e.study_runs} runs"
     text = (
         f"Over {e.population_runs} runs {rule.found(e.population)}; {rule.bound(e.threshold)}; "
         f"{e.share:.0%} of studies of {size} show B's picture"
     )
-    return text + (f", but so do {e.null_rate:.0%} where it is false" if vague else "")
+    if not conditions["seen"]:
+        text += f", where {SEEN:.0%} are asked for"
+    elif not conditions["true"]:
+        text += ", but all runs together do not settle on which side of the bound it lies"
+    if e.null_rate > 1.0 - TELLING or (conditions["seen"] and not conditions["telling"]):
+        text += f", but so do {e.null_rate:.0%} where it is false"
+    return text
 
 
 def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:

@@ -100,12 +100,19 @@ class Measure:
     compute : callable
     window : str or None
         Where it has one.
+    percent : bool
+        It is a share, and read in percent.
     """
 
     says: str
     found: str
     compute: Callable[[Curves, Scene], Array]
     window: WindowName | None = None
+    percent: bool = False
+
+    def number(self, value: float) -> str:
+        """Return a value of it in words."""
+        return f"{100 * value:.3g}%" if self.percent else f"{value:.3g}"
 
 
 def average(name: WindowName) -> Measure:
@@ -132,7 +139,7 @@ def share_above_line(name: WindowName) -> Measure:
     w = phrase(name)
     return Measure(
         f"share of {w} above the line 3.592", f"{{0}} lies above the line 3.592 for {{v:.0%}} of {w}",
-        lambda c, s: consistency.fraction_above(c[0], s.line, s.window(name)),
+        lambda c, s: consistency.fraction_above(c[0], s.line, s.window(name)), percent=True,
     )  # fmt: skip
 
 

@@ -114,7 +114,7 @@ class Rule:
         """Return in words what the threshold stands for."""
         if self.effect == threshold or not self.calibrated:
             word = "at least" if self.above else "at most"
-            return f"the rule asks for {word} {threshold:.3g}"
+            return f"the rule asks for {word} {self.measure.number(threshold)}"
         if self.null == "swapped":
             return f"with two filters that are alike it would stay under {threshold:.3g} in 95 % of studies"
         return f"a consistent filter would stay under {threshold:.3g} in 95 % of studies"
