@@ -11,6 +11,7 @@ import importlib
 import importlib.util
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -113,7 +114,15 @@ class RunContext:
             import joblib
 
             task = _Task(function, _current_backend())
-            yield joblib.Parallel(return_as="generator")(joblib.delayed(task)(batch) for batch in batches)
+            arriving = joblib.Parallel(return_as="generator")(
+                joblib.delayed(task)(batch) for batch in batches
+            )
+            try:
+                yield arriving
+            finally:
+                with warnings.catch_warnings():  # of the tasks that an interrupt cancels
+                    warnings.simplefilter("ignore", UserWarning)
+                    arriving.close()
 
 
 def run_batches(function: Callable[[T], R], batches: Sequence[T], **how: Any) -> list[R]:
