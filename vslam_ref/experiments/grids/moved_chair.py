@@ -212,7 +212,7 @@ def _for_ever(study: Study[Run]) -> Claim:
         "Under the table, a chair put down on once-free floor is dynamic for ever",
         f"in every run, over the last {SLACK:g} s of the watch: share of its cells in D > 0.5 and in S < 0.5",
         (d > 0.5) & (s < 0.5),
-        f"{last:g} s after the chair was put down, D holds {d.mean():.0%} of its cells and S {s.mean():.0%}",
+        f"When the chair has stood for {last:g} s, D holds {d.mean():.0%} of its cells and S {s.mean():.0%}",
         {"dynamic": float(d.mean()), "static": float(s.mean())},
         "A§4.2-4.3, errata",
     )
