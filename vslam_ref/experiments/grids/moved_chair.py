@@ -244,7 +244,7 @@ def _leaves(study: Study[Run]) -> Claim:
         "S lets go of the place from which the chair was taken, under both",
         f"in every run and both variants: share still static < 0.05 from {SLACK + 1:g} s after it was lifted",
         np.array((old < 0.05).all(axis=0), dtype=np.bool_),
-        f"{SLACK + 1:g} s after the chair was lifted S still holds {old[0].mean():.1%} of its old place "
+        f"From {SLACK + 1:g} s after the chair was lifted S holds {old[0].mean():.1%} of its old place "
         "under the "
         f"table and {old[1].mean():.1%} with ageing; 5 % are allowed",
         {v: float(o.mean()) for v, o in zip(VARIANTS, old, strict=True)},
