@@ -6,7 +6,7 @@ The rooms of the house stand on floors; each imports only from floors below::
     5  plot, datasets                                    pictures; foreign formats
     4  systems                                           whole methods on recorded data
     3  grids, worlds                                     maps of cells; simulators with exact truth
-    2  estimation, filters, metrics                      estimators; how good they are
+    2  estimation, filters, features, metrics            estimators; what is seen; how good they are
     1  geometry, interop                                 rotations, motions, cameras; other conventions
     0  _kernels, arrays, support, chapters               Numba twins of hot loops; what all rooms use
 
