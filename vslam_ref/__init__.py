@@ -21,7 +21,10 @@ from types import ModuleType
 
 __version__ = "0.1.0"
 
-_ROOMS = ("geometry", "filters", "metrics", "worlds", "plot", "experiments", "testing")
+_ROOMS = (
+    *("geometry", "interop", "estimation", "filters", "features", "metrics", "grids", "worlds", "systems"),
+    *("testing", "plot", "datasets", "experiments", "conformance"),
+)
 
 __all__ = ["__version__", *_ROOMS]
 

@@ -36,6 +36,19 @@ def hidden(out: Path) -> list[Path]:
     return sorted(out.parent.glob(f".{out.name}.toy-unfinished-*"))
 
 
+def workers_of(log: Path) -> list[int]:
+    return [int(path.name.rpartition("-")[2]) for path in log.parent.glob(f"{log.name}-by-*")]
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        status = Path(f"/proc/{pid}/stat")
+        return not status.is_file() or status.read_text().rpartition(")")[2].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+
+
 def content(folder: Path) -> tuple[bytes, dict]:
     result = json.loads((folder / "result.json").read_text())
     return (folder / "runs.npz").read_bytes(), {k: v for k, v in result.items() if k != "seconds"}
@@ -57,7 +70,10 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_bytes(tmp_path, jobs):
     [folder] = hidden(out)
     assert json.loads((folder / "about.json").read_text())["experiment"] == "toy"
     finished = len(list(folder.glob("*.npz")))
-    time.sleep(1.0)  # workers that are left finish their batch
+    deadline = time.monotonic() + 30
+    while workers := [pid for pid in workers_of(log) if alive(pid)]:
+        assert time.monotonic() < deadline, f"workers {workers} outlive the program that started them"
+        time.sleep(0.1)
     log.unlink()
     assert start(out, jobs, TOY_LOG=str(log)).wait() == 0
     assert len(log.read_text().split()) == 6 - finished  # batches that were finished are not run again

@@ -56,6 +56,7 @@ def simulate(config: ToyConfig, point: None, seeds: tuple[np.random.SeedSequence
     if "TOY_LOG" in os.environ:  # for the test of a run that is killed and started again
         with open(os.environ["TOY_LOG"], "a") as log:
             log.write(f"{seeds[0].spawn_key[0]}\n")
+        Path(f"{os.environ['TOY_LOG']}-by-{os.getpid()}").touch()
         time.sleep(float(os.environ.get("TOY_SLEEP", "0")))
     for seed in seeds:
         rng = np.random.default_rng(seed)

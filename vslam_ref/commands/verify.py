@@ -151,6 +151,8 @@ def _show(report: Report) -> None:
             print(f"  {key:<10} {_short(first[key])}")
     if not any(o.status == "passed" for o in report.outcomes):
         print("nothing passed: a program that answers nothing is not verified")
+    elif report.passed:
+        print("all answered cases pass")
 
 
 def _short(value: Any, most: int = 300) -> str:

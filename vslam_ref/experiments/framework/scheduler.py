@@ -7,10 +7,13 @@ its batch alone.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import os
 import sys
+import threading
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -113,7 +116,8 @@ class RunContext:
         with _joblib_backend(self.scheduler, self.dask_address, jobs, function.__module__):
             import joblib
 
-            task = _Task(function, _current_backend())
+            caller = os.getpid() if self.scheduler == "local" else None
+            task = _Task(function, _current_backend(), caller)
             arriving = joblib.Parallel(return_as="generator")(
                 joblib.delayed(task)(batch) for batch in batches
             )
@@ -220,15 +224,32 @@ def _joblib_backend(scheduler: str, address: str | None, jobs: int, module: str)
 
 @dataclass(frozen=True)
 class _Task(Generic[T, R]):
-    """A function that carries the caller's backend into a worker."""
+    """A function that carries the caller's backend into a worker, which ends when ``caller`` does."""
 
     function: Callable[[T], R]
     backend: str
+    caller: int | None
 
     def __call__(self, batch: T) -> R:
+        if self.caller is not None:
+            _end_with(self.caller)
         _one_thread_for_good()
         _backend_for_good(self.backend)
         return self.function(batch)
+
+
+@functools.cache
+def _end_with(caller: int) -> None:
+    """End this worker process when its caller is gone, as after ``kill -9``; else it would wait for ever."""
+    if os.getppid() != caller:
+        return  # not its child (Windows, or another way to start workers): it cannot be watched like this
+
+    def watch() -> None:
+        while os.getppid() == caller:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _one_thread_for_good() -> None:

@@ -208,7 +208,7 @@ def anchored_not_worse(grid: Grid, rng: np.random.Generator) -> Claim:
         None if few else all(u <= APART for u in upper.values()),
         f"The anchored EKF's NEES over the IEKF's is at most {max(ratio.values()):.3g}; the interval's "
         "upper end is "
-        f"largest, {upper[worst]:.3g}, at {worst}, and {APART:g} is allowed",
+        f"largest, {upper[worst]:.3g}, at {worst.replace('_', ' ')}, and {APART:g} is allowed",
         {"largest_upper_end": [worst, upper[worst]], "largest_ratio": max(ratio.values())},
         share=sum(u <= APART for u in upper.values()) / len(upper),
         least_runs=LEAST_STUDY,
