@@ -203,7 +203,15 @@ class EkfSlam(SlamFilter):
 
 
 class Truth(NamedTuple):
-    """True poses T_world_vehicle (T + 1, 3) and landmarks by identity (n, 2), for the ideal EKF only."""
+    """What is true, for the ideal EKF only.
+
+    Attributes
+    ----------
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres; row i belongs to identity i.
+    """
 
     T_world_vehicle: Array
     landmarks: Array
@@ -214,7 +222,7 @@ class IdealEkf(EkfSlam):
 
     Parameters
     ----------
-    mean, cov, capacity
+    mean, cov, capacity : array_like, array_like, int
         As for :class:`EkfSlam`.
     truth : Truth
         Pose at the start and after every prediction, and the landmarks.
@@ -263,7 +271,7 @@ class AnchoredEkf(EkfSlam):
 
     Parameters
     ----------
-    mean, cov, capacity
+    mean, cov, capacity : array_like, array_like, int
         As for :class:`EkfSlam`.
 
     Notes

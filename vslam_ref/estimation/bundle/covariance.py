@@ -80,7 +80,7 @@ def covariance(
     ----------
     result : BundleResult
         At a minimum.
-    views, points : array_like of int
+    views, points : array_like of int, shapes (v,), (p,)
         Numbers of what is asked for.
     gauge : {"fixed", "free"}
         ``fixed``: what the problem holds is known.  ``free``: nothing may be held; see the module.

@@ -1,4 +1,7 @@
-"""Wrong observations, found by their errors, and taken out."""
+"""Wrong observations, found by their errors, and taken out.
+
+Errors are in pixels, or in standard deviations where covariances are given.
+"""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ for the intrinsics, and a border between them::
     [ B_1' B_2' ...  C  ]  [ camera  ]       [ g_c ]
 
 Eliminating the poses leaves a system as large as the camera has parameters, whatever the number of views.
+Residuals are in pixels; a pose step in the board's unit and radians, intrinsics in their own units.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ def damped_step(normal: Arrow, damping: float, scale: Blocks) -> Blocks | None:
     if reduced is None:
         return None
     try:
-        L = np.linalg.cholesky(reduced.S)
+        L = np.linalg.cholesky(reduced.S)  # eq-damped
     except np.linalg.LinAlgError:
         return None
     free = -np.linalg.solve(L.T, np.linalg.solve(L, reduced.gradient))
@@ -148,4 +149,4 @@ def promised(normal: Arrow, step: Blocks, damping: float, scale: Blocks) -> floa
     """Decrease of the cost that the linear model promises for a damped step."""
     slope = float((normal.g_pose * step.pose).sum() + normal.g_free @ step.free)
     size = float(((scale.pose * step.pose) ** 2).sum() + ((scale.free * step.free) ** 2).sum())
-    return 0.5 * (damping * size - slope)
+    return 0.5 * (damping * size - slope)  # eq-gain-ratio: its denominator

@@ -19,14 +19,31 @@ from vslam_ref.geometry.cameras import Lens, projection
 
 
 class State(NamedTuple):
-    """What is estimated: intrinsics (n,), and the board's pose in each view, T_cam_board (V, 4, 4)."""
+    """What is estimated.
+
+    Attributes
+    ----------
+    params : ndarray, shape (n,)
+        Intrinsics: focal lengths and centre in pixels, distortion dimensionless.
+    T_cam_board : ndarray, shape (V, 4, 4)
+        The board's pose in each view, translations in the board's unit.
+    """
 
     params: Array
     T_cam_board: Array
 
 
 class Residual(NamedTuple):
-    """Predicted minus measured pixels (M, 2), NaN where the camera does not see its corner; Jacobians."""
+    """Residuals of all corners, and their Jacobians.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (M, 2)
+        Predicted minus measured, pixels; NaN where the camera does not see its corner.
+    J_pose : ndarray, shape (M, 2, 6)
+        In the left perturbation of the pose of the corner's view.
+    J_intrinsics : ndarray, shape (M, 2, n)
+    """
 
     residual: Array
     J_pose: Array

@@ -121,7 +121,17 @@ def tilt(T_cam_board: Array) -> Array:
 
 
 class Certainty(NamedTuple):
-    """Noise, covariance of all intrinsics, and what is not determined."""
+    """Noise, covariance of all intrinsics, and what is not determined.
+
+    Attributes
+    ----------
+    sigma_px : float
+        Standard deviation of a coordinate of a corner, pixels.
+    covariance : ndarray, shape (n, n), or None
+        Of the intrinsics, each in its unit; None where they are not determined.
+    undetermined : str
+        What the corners do not determine; empty where they determine all.
+    """
 
     sigma_px: float
     covariance: Array | None

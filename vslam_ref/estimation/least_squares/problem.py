@@ -1,7 +1,7 @@
 """What is minimised: residuals, their Jacobian (given or numeric), a robust loss, and a way to add a step.
 
 Values that are not finite are no error here: an exponential may overflow at a bold step, and the solver
-then takes a shorter one.
+then takes a shorter one.  Residuals may have any unit, and parameters each its own unit.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Point(NamedTuple):
 
     Attributes
     ----------
-    x : ndarray
+    x : ndarray, shape (k,)
     residual, costs, weights : ndarray, shapes (m,), (m / block,), (m,)
     jacobian : ndarray, shape (m, n)
     rows, target : ndarray, shapes (m, n), (m,)
@@ -54,7 +54,7 @@ class Point(NamedTuple):
 
 
 def add(x: Array, step: Array) -> Array:
-    """Return x + step, the way to add in a vector space."""
+    """Return ``x (n,)`` + ``step (n,)``, the way to add in a vector space."""
     return x + step
 
 
@@ -170,9 +170,9 @@ class Problem:
 
 
 def gradient_norm(rows: Array, target: Array, lengths: Array) -> float:
-    """Largest cosine between a column of the Jacobian and the residual; 0 where one of them is zero.
+    """Largest cosine between a column of ``rows (m, n)`` and ``target (m,)``; 0 where one of them is zero.
 
-    It has no unit, so one threshold serves pixels and metres.
+    ``lengths (n,)`` are those of the columns.  It has no unit, so one threshold serves pixels and metres.
     """
     length = float(np.linalg.norm(target))
     if length == 0.0 or rows.size == 0:
@@ -189,7 +189,7 @@ def numeric_jacobian(
     ----------
     function : callable
         Maps x to (m,).
-    x : ndarray
+    x : ndarray, shape (k,)
     plus : callable
         Complex steps are tried only for the plain sum.
     coordinates : int, optional
@@ -218,6 +218,7 @@ def numeric_jacobian(
     sizes = np.maximum(1.0, np.abs(x)) if plus is add else np.ones(n)
     steps = EPS ** (1 / 3) * np.eye(n) * sizes
     pairs = [(function(plus(x, h)), function(plus(x, -h)), h.sum()) for h in steps]
+    # eq-difference-quotient
     slopes = [(np.asarray(a, float) - np.asarray(b, float)) / (2.0 * h) for a, b, h in pairs]
     return np.stack(slopes, axis=1) if slopes else np.empty((len(np.asarray(function(x))), 0))
 

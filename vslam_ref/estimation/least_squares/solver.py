@@ -38,7 +38,7 @@ def minimise(
         Maps x to (m,), predicted minus measured.
     start : array_like
         Where to begin, finite.
-    with_jacobian, loss, block, plus, coordinates
+    with_jacobian, loss, block, plus, coordinates : optional
         As for :class:`~vslam_ref.estimation.least_squares.problem.Problem`.
     options : Options, optional
 

@@ -108,7 +108,7 @@ def reduced_predict_first_order_in_place(
 ) -> None:
     """:func:`reduced_predict_in_place` with first-order moments of increments.
 
-    ``ds``, ``dalpha`` (B, k) and ``cov`` (B, k, 2, 2) are those of k increments, one after the other.
+    ``ds (B, k)``, ``dalpha (B, k)``, ``cov (B, k, 2, 2)``: those of k increments, one after the other.
     """
     mean, noise = control_first_order(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
     _predict(x_p, P_a, frame, mean.reshape(*ds.shape, 5), noise.reshape(*ds.shape, 5, 5))
@@ -184,8 +184,10 @@ def reduced_update_in_place(
 
     Returns
     -------
-    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
-        measured - predicted, and its covariance.
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted.
+    S : ndarray, shape (B, 2 m, 2 m)
+        Its covariance.
     """
     _apply(state, b, P_a, frame)
     seen = reduced_expected(state, frame, columns, z, cov_z)
