@@ -1,4 +1,4 @@
-"""EKF-SLAM for a planar vehicle, and two controls that tell what its inconsistency comes from.
+"""EKF-SLAM for a planar vehicle, and two controls that show where its inconsistency comes from.
 
 ::
 
@@ -222,10 +222,12 @@ class IdealEkf(EkfSlam):
 
     Parameters
     ----------
-    mean, cov, capacity : array_like, array_like, int
+    mean, cov : array_like
         As for :class:`EkfSlam`.
     truth : Truth
         Pose at the start and after every prediction, and the landmarks.
+    capacity : int
+        As for :class:`EkfSlam`.
     """
 
     def __init__(self, mean: ArrayLike, cov: ArrayLike, truth: Truth, capacity: int = 32) -> None:

@@ -1,4 +1,4 @@
-r"""What the linearised system of a run can tell apart: local observability and its nullity.
+r"""What the linearised system of a run can distinguish: local observability and its nullity.
 
 A run is a list of predictions with Jacobians F_k and measurements with Jacobians H_k.  An error d of
 the start shows in the k-th measurement as H_k F_{k-1} ... F_0 d; stacked::
@@ -8,7 +8,7 @@ the start shows in the k-th measurement as H_k F_{k-1} ... F_0 d; stacked::
         [ H_2 F_1 F_0     ]
         [ ...             ]
 
-Landmarks relative to the vehicle cannot tell where the world's origin lies nor how it is turned: the
+Landmarks relative to the vehicle do not show where the world's origin lies nor how it is turned: the
 true system has nullity 3.  A filter believes what *its* Jacobians say:
 
 ===========================  =======  ===============================================================
@@ -231,7 +231,9 @@ def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "firs
 
 
 def lift_tangent(T_world_vehicle: ArrayLike, landmarks: ArrayLike) -> Array:
-    """Derivative of the lift in pose and landmarks: B14 and B15.
+    """Derivative of the lift in pose and landmarks.
+
+    Implements the derivatives of :eq:`eq-b14` (B14) and :eq:`eq-b15` (B15).
 
     Its columns span the tangent space of the manifold on which lifted states of real vehicles lie.
 

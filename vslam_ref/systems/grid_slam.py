@@ -8,7 +8,7 @@
 
 The scan is matched with the map *before* it is drawn into it.  The pose's error at that moment goes into
 the map and stays there; the covariance of the filter knows nothing of it.  What that costs is measured in
-chapter 20.
+chapter 20.  Poses are in metres and radians.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Step(NamedTuple):
         Of the scan, laser frame.
     landmark : ndarray of int, shape (m,)
         Number of the landmark that each corner updated; -1 none, -2 ambiguous.
-    chosen : ndarray of int
+    chosen : ndarray of int, shape (k,)
         Numbers of new landmarks.
     withdrawn : list of Landmark
     """

@@ -3,6 +3,8 @@
 ::
 
     world, noise --> Drive (increments, sightings) --follow--> after every step: pose, covariance, innovation
+
+Positions are in metres, angles in radians, times in seconds.
 """
 
 from __future__ import annotations
@@ -65,6 +67,10 @@ def follow(slam: SlamFilter, drive: Drive, every: int = 1) -> Iterator[Step]:
     """Yield the start and every so many steps: predict, update where something is seen, read the pose.
 
     A filter that puts increments down until they are needed is asked for its pose no more often than that.
+
+    Yields
+    ------
+    Step
     """
     ds, dalpha, cov = drive.increments
     for k in range(ds.shape[1] + 1):

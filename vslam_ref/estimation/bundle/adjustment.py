@@ -1,7 +1,7 @@
 """What a descent asks of bundle adjustment: normal equations at a place, a step, and where it leads.
 
-Residuals are in pixels, or in standard deviations where covariances are given; rotations of a step in radians,
-translations and points in the unit of the scene, usually metres.
+Residuals are in pixels, or in standard deviations where covariances are given; rotations of a step in
+radians, translations and points in the unit of the scene, usually metres.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def moved(problem: BundleProblem, state: State, step: Change) -> State | None:
     """State after a step: Exp(xi) T, and sums; None where its intrinsics make no camera."""
     T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
     intrinsics = state.intrinsics.copy()
-    # views that share a lens have equal steps of it: any of them tells
+    # views that share a lens have equal steps of it: any of them will do
     intrinsics[problem.lens_of_view] += step.view[:, 6:] @ problem.free.intrinsics.T
     if step.view.shape[1] > 6 and not possible(problem.model, intrinsics):
         return None

@@ -50,14 +50,14 @@ class Diagnosis(NamedTuple):
         >>> Diagnosis(none, np.array([3, 8]), none, none, none, 1).sentences()
         ['points seen once, whose depth is not measured: 2 (first: 3)']
         """
-        told = (
+        rows = (
             ("points without an observation, which stay", self.unseen_points),
             ("points seen once, whose depth is not measured", self.once_seen_points),
             ("views without an observation, which stay", self.empty_views),
             ("views that see fewer than three points, which leaves their pose open", self.weak_views),
             ("observations of a point behind the camera", self.behind),
         )
-        found = [f"{words}: {len(which)} (first: {which[0]})" for words, which in told if len(which)]
+        found = [f"{words}: {len(which)} (first: {which[0]})" for words, which in rows if len(which)]
         if self.parts > 1:
             found.append(f"the views fall into {self.parts} groups that no point ties together")
         return found

@@ -6,8 +6,8 @@ With weighted rows r, J_view, J_point of each observation, summed over the obser
     C  = sum J_point^T J_point   g_point = sum J_point^T r      per point  (N, 3, 3), (N, 3)
     W  = J_view^T J_point                                       per observation (n, d, 3)
 
-Rows are in pixels, or in standard deviations where covariances are given; so every block has the unit of a squared
-row over those of the coordinates: radians, and the unit of the scene.
+Rows are in pixels, or in standard deviations where covariances are given; so every block has the unit of
+a squared row over those of the coordinates: radians, and the unit of the scene.
 """
 
 from __future__ import annotations

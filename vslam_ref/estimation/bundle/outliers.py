@@ -30,7 +30,7 @@ class Cleaned(NamedTuple):
 
 
 def wrong(problem: BundleProblem, sigma: float, limit: float = RAYLEIGH_99) -> BoolArray:
-    """Tell which observations are wrong: longer than ``limit`` times the scale, or without an image.
+    """Which observations are wrong: longer than ``limit`` times the scale, or without an image.
 
     Parameters
     ----------

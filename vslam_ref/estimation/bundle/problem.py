@@ -63,7 +63,7 @@ class Observations:
     Raises
     ------
     ValueError
-        On shapes that do not fit, numbers that are not finite, a covariance that is none.
+        On shapes that do not fit, numbers that are not finite, a covariance that is not positive definite.
     """
 
     view: IntArray

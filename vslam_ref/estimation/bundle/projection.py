@@ -80,7 +80,7 @@ class Linearised(NamedTuple):
 
 
 def is_polynomial(model: type[Camera]) -> bool:
-    """Tell whether a camera model is one of those written out here."""
+    """Whether a camera model is one of those written out here."""
     return model in (Pinhole, Radtan)
 
 
@@ -126,7 +126,8 @@ def polynomial_residuals(
     """Residuals (n, 2) and validity (n,) for lenses with the nine intrinsics ``params`` (L, 9).
 
     Parameters as those of the same names of :func:`.normal.polynomial_normal`: ``R_cam_world (V, 3, 3)``,
-    ``t_cam_world (V, 3)``, ``X_world (N, 3)``; ``view (n,)``, ``point (n,)``, ``lens (n,)``; ``uv (n, 2)``, pixels.
+    ``t_cam_world (V, 3)``, ``X_world (N, 3)``; ``view (n,)``, ``point (n,)``, ``lens (n,)``; ``uv (n, 2)``,
+    pixels.
     """
     seen = _polynomial(State(R_cam_world, t_cam_world, X_world, params), Links(view, point, lens, uv))
     return np.where(seen.front[:, None], seen.pixels() - uv, 0.0), seen.front

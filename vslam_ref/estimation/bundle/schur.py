@@ -19,8 +19,8 @@ The lower row gives the points, once the views are known; put into the upper row
 C is block diagonal, so :math:`C^{-1} = M M^T` with M of 3 x 3 blocks, and S = B - V V^T with V = W M.  This
 is symmetric by construction, and half the work.
 
-Residuals are in pixels, or in standard deviations where covariances are given; every block and step has the unit
-that follows, with angles in radians and lengths in the unit of the scene.
+Residuals are in pixels, or in standard deviations where covariances are given; every block and step has the
+unit that follows, with angles in radians and lengths in the unit of the scene.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def diagonals(normal: Normal, table: Structure) -> Diagonals:
 
 
 def add_at_columns(columns: IntArray, values: Array, size: int) -> Array:
-    """Add up values (V, d) of the same column of the reduced system, (size,); ``columns (V, d)`` as in Structure."""
+    """Add up values (V, d) of the same column of the reduced system, (size,), by ``columns (V, d)``."""
     total: Array = np.bincount(columns.ravel(), values.ravel(), minlength=size + 1)[:size].astype(np.float64)
     return total
 
@@ -192,7 +192,8 @@ def point_steps(
     """Steps of the points (N, 3), from those of the views (V, d): -C^-1 (g_point + W^T step).
 
     Implements :eq:`eq-back-substitution`.
-    ``W (n, d, 3)``, ``M (N, 3, 3)``, ``g_point (N, 3)``, ``view_steps (V, d)``, ``view (n,)``, ``offsets (N + 1,)``.
+    ``W (n, d, 3)``, ``M (N, 3, 3)``, ``g_point (N, 3)``, ``view_steps (V, d)``, ``view (n,)``,
+    ``offsets (N + 1,)``.
     """
     pulled = np.matmul(view_steps[view][:, None, :], W)[:, 0]
     total = sum_by_point(pulled, offsets) + g_point

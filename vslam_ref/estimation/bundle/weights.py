@@ -4,7 +4,7 @@ The error of an observation is :math:`\lVert e \rVert_\Sigma = (e^T \Sigma^{-1} 
 standard deviations, or in pixels where no covariance was given.  The objective is the sum of
 :math:`\rho(\lVert e \rVert_\Sigma)`.
 
-*Scale.*  A loss needs to know how large honest errors are.  Either it is given, or it is estimated: the adaptive
+*Scale.*  A loss needs to know how large honest errors are.  It is given, or it is estimated: the adaptive
 scale is taken from the median error anew after every accepted step, as PTAM does.  It changes the objective
 as it goes; a step is always judged at one scale.
 """
@@ -105,8 +105,8 @@ class Weighted(NamedTuple):
 def weigh(robust: Robust, sigma: float, errors: Array, valid: BoolArray) -> Weighted:
     """Cost and weight of whitened errors (n, 2).
 
-    An observation without an image (``valid (n,)`` is False) costs what an infinite error costs: a constant for a loss
-    that gives up, infinity for one that does not.
+    An observation without an image (``valid (n,)`` is False) costs what an infinite error costs: a constant
+    for a loss that gives up, infinity for one that does not.
     """
     loss = robust.loss.scaled(sigma) if math.isfinite(sigma) else L2()
     if isinstance(loss, L2):

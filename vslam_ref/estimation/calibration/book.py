@@ -8,7 +8,8 @@
     intrinsics         S theta' = -(g_c - sum B_v' A_v^-1 g_v)
     poses              xi_v = -A_v^-1 (g_v + B_v theta')
 
-Residuals are in pixels; poses in the board's unit and radians.  A test asserts that the fast form takes the same steps.
+Residuals are in pixels; poses in the board's unit and radians.  A test asserts that the fast form takes the
+same steps.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class Calibration:
 
     @property
     def rms_px(self) -> float:
-        """Root of the mean *squared distance*, as OpenCV and PTAM tell it."""
+        """Root of the mean *squared distance*, as OpenCV and PTAM report it."""
         return float(np.sqrt((self.errors_px**2).mean()))
 
     @property
@@ -189,16 +189,16 @@ def _vague(point: Point, cov: Array) -> str:
     lost = [i for i in range(4) if share[i] > LARGEST_SHARE]
     if not lost:
         return ""
-    told = ", ".join(
+    groups = ", ".join(
         f"{name} = {point.state.params[i]:.6g} +- {deviation[i]:.3g}"
         for i, name in enumerate(("fx", "fy", "cx", "cy"))
         if i in lost
     )
-    return f"{told}{_flat(point)}"
+    return f"{groups}{_flat(point)}"
 
 
 def _flat(point: Point) -> str:
-    """Why the sensor is not determined, where the boards' directions tell."""
+    """Why the sensor is not determined, where the boards' directions show it."""
     T = point.state.T_cam_board
     largest = float(tilt(T).max())
     if largest > FLAT_TILT:

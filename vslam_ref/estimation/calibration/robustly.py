@@ -41,8 +41,8 @@ def calibrate_robustly(
     Parameters
     ----------
     views : sequence of (X_board, uv)
-        As for :func:`.solver.calibrate`: corners (N, 3) or (N, 2) in the board's unit, and where they were found
-        (N, 2), pixels.
+        As for :func:`.solver.calibrate`: corners (N, 3) or (N, 2) in the board's unit, and where they were
+        found (N, 2), pixels.
     size : (int, int)
         Width and height of the images, pixels.
     model : str

@@ -79,8 +79,8 @@ def minimise(
         return _nothing(x, r, 0.0, "no_residuals", "there are no residuals")
     here = problem.linearise(x)
     if here is None:
-        told = "residual, cost or Jacobian is not finite at the start"
-        return _nothing(x, r if np.isfinite(r).all() else r[:0], math.inf, "not_finite", told)
+        message = "residual, cost or Jacobian is not finite at the start"
+        return _nothing(x, r if np.isfinite(r).all() else r[:0], math.inf, "not_finite", message)
     end = descend(problem, here, options)
     return Solution(
         x=end.here.x,

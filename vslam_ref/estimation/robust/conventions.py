@@ -44,7 +44,7 @@ scales, cannot be compared.
 
 
 class SquaredForm(NamedTuple):
-    """A loss of s = x²: ``rho (...)``, and ``first (...)`` and ``second (...)`` derivative with respect to s."""
+    """A loss of s = x²: ``rho (...)``, ``first (...)`` and ``second (...)`` derivative with respect to s."""
 
     rho: Array
     first: Array

@@ -31,7 +31,7 @@ MAD_NORM_2D = 0.8493218002880191
 class Scale(NamedTuple):
     """Estimated standard deviation of one coordinate, and why it is what it is.
 
-    ``sigma`` is never NaN.  It is ``inf`` where the sample says nothing (``reason`` tells), so that
+    ``sigma`` is never NaN.  It is ``inf`` where the sample does not determine it (see ``reason``), so that
     ``loss.scaled(sigma)`` is plain least squares; it is 0 where more than half of the errors are 0.
     """
 

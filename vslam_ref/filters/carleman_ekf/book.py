@@ -100,7 +100,7 @@ def vehicle_noise(z: Array, U: Array) -> Array:
 
 
 def predict_lifted(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
-    """Move by an increment with noise Q (2, 2): one Q_U for vehicle and landmarks, and so for the cross blocks."""
+    """Move by an increment with noise Q (2, 2): one Q_U for vehicle, landmarks and the cross blocks."""
     U, Q_U = control(ds, dalpha, Q)
     turn = np.array([[U[2], U[1]], [-U[1], U[2]]])
     M_L = block_diag(np.eye(2), turn, turn)  # eq-b18

@@ -7,7 +7,8 @@
     a camera            stack the rows of all points   the smallest singular vector is [R t]
     from three points   d_1, d_2, d_3 by two conics    then the motion of one triangle onto the other
 
-Points, centres and translations share any unit; bearings are unit vectors.  The fast forms do the same for many points, or problems, at once.  A test asserts that they agree.
+Points, centres and translations share any unit; bearings are unit vectors.  The fast
+forms do the same for many points, or problems, at once.  A test asserts that they agree.
 """
 
 from __future__ import annotations

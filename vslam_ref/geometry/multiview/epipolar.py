@@ -17,9 +17,9 @@ from vslam_ref.geometry import se3, so3
 
 
 def relative_motion(T_a_world: ArrayLike, T_b_world: ArrayLike) -> Array:
-    """``T_b_a`` (..., 4, 4) of ``T_a_world (..., 4, 4)`` and ``T_b_world (..., 4, 4)``, translations of any unit.
+    """``T_b_a`` (..., 4, 4) of ``T_a_world (..., 4, 4)`` and ``T_b_world (..., 4, 4)``.
 
-    T_b_a = T_b_world T_a_world^-1.
+    T_b_a = T_b_world T_a_world^-1; translations in any unit.
     """
     return se3.compose(T_b_world, se3.inverse(T_a_world))
 

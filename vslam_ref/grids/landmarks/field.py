@@ -131,7 +131,10 @@ def scan_residuals(T_world_laser: ArrayLike, points: ArrayLike, field: DistanceF
 def scan_residuals_with_jacobians(
     T_world_laser: ArrayLike, points: ArrayLike, field: DistanceField
 ) -> Residuals:
-    """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters."""
+    """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters.
+
+    Implements the Jacobian of :eq:`eq-field-residual`.
+    """
     T_world_laser, points = np.asarray(T_world_laser, dtype=np.float64), np.asarray(points, dtype=np.float64)
     world = se2.act(T_world_laser, points)
     at = sampled(world, field)

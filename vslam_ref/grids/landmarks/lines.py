@@ -74,7 +74,15 @@ class Lines(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Value (..., 2), where two lines cross, and its Jacobians (..., 2, 2) in offsets and angles."""
+    """Where two lines cross.
+
+    Attributes
+    ----------
+    value : ndarray, shape (..., 2)
+        Metres.
+    J_offset, J_angle : ndarray, shape (..., 2, 2)
+        Jacobians in both offsets, and in both angles (metres per radian).
+    """
 
     value: Array
     J_offset: Array
@@ -141,6 +149,7 @@ def cross(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -
 def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -> Crossing:
     """:func:`cross` and its Jacobians; same parameters.
 
+    Implements :eq:`eq-corner-crossing` and its derivatives.
     Differentiate n_i . (X - c_i) = offset_i.  A turn of line i moves its normal by -t_i, so that
     n_i . dX = d offset_i + (t_i . (X - c_i)) d angle_i: the lever is the distance from the line's middle.
     """
@@ -161,7 +170,9 @@ def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike 
 
 
 def fit_lines(points: Array, beams: IntArray, runs: list[tuple[int, int]], sigma: float) -> Lines:
-    """Lines by total least squares through ``points[a:b]`` for each run (a, b) of ``beams``.
+    """Lines by total least squares through ``points[a:b]`` for each run (a, b).
+
+    ``points (n, 2)``, metres, and the numbers of their ``beams (n,)``.
 
     Implements :eq:`eq-line-variances`.
     """

@@ -74,7 +74,7 @@ def bootstrap_interval(
     samples: int = 2000,
     level: float = 0.95,
 ) -> tuple[float, float]:
-    """Interval of a statistic of the mean curve of q (M, T): whole runs are drawn, M of M with replacement."""
+    """Interval of a statistic of the mean of q (M, T): M whole runs are drawn again, with replacement."""
     M, values = len(q), []
     for _ in range(samples):
         times_drawn = rng.multinomial(M, np.full(M, 1 / M))

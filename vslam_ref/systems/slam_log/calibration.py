@@ -63,7 +63,7 @@ class Calibration:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Calibration:
-        """Build from a mapping; a name that is none of the fields raises a ValueError."""
+        """Build from a mapping; an unknown name raises a ValueError."""
         known = [entry.name for entry in fields(cls)]
         for name in values:
             if name not in known:

@@ -100,7 +100,7 @@ def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
 def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
     """Put a run into the world.
 
-    Returns None where the truth cannot tell: no overlap in time, or, unaligned, no true heading.
+    Returns None where the truth does not determine it: no overlap in time, or, unaligned, no true heading.
     """
     ok, true = truth_at(truth, run.times)
     poses, covs = reference_point(run.T_run_vehicle[ok], run.covs[ok], truth.lever)
@@ -130,8 +130,9 @@ def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Arr
 
     Returns
     -------
-    poses, covs : ndarray, shapes (N, 3), (N, 3, 3)
+    poses : ndarray, shape (N, 3)
         In the same frame.
+    covs : ndarray, shape (N, 3, 3)
     """
     arm = so2.rotate(poses[:, 2], np.broadcast_to(lever, (len(poses), 2)))
     J = np.tile(np.eye(3), (len(poses), 1, 1))

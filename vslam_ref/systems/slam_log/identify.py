@@ -7,8 +7,8 @@ Two steps, on all logs of the set together:
    estimates are averaged with their information matrices, so all robots get the same values;
 2. *everything, noises above all*, where the innovations of the EKF and of the IEKF together are most
    likely: the values favour neither filter.  An innovation's covariance holds odometry noise, sensor
-   noise and map; one that is too small or too large costs likelihood.  One sighting in a hundred is
-   allowed to be anything inside the sensor's field, or a few misread barcodes would inflate every
+   noise and map; one that is too small or too large costs likelihood.  One sighting in a hundred may
+   lie anywhere inside the sensor's field, or a few misread barcodes would inflate every
    sigma.  One value at a time is moved to the summit of a parabola, gains in units of their standard
    errors from step 1, sigmas in their logarithms.
 

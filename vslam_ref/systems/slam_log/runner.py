@@ -33,7 +33,7 @@ Build = Callable[[Array, Array, int], SlamFilter]
 
 
 def iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
-    """Seed B's filter with its map, and with exact Gaussian moments.
+    """Seed B's filter with its map, and with exact Gaussian moments, from ``mean (3,)`` and ``cov (3, 3)``.
 
     A heading that has become uncertain by e.g. 0.4 rad shortens the mean of the heading vector.  With
     first-order moments it keeps its length, and a linear correction then makes it, and every landmark's
@@ -43,7 +43,7 @@ def iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
 
 
 def iekf_first_order(mean: Array, cov: Array, capacity: int) -> SlamFilter:
-    """Seed B's filter with its map, P0 and the control noise lifted by the Jacobian."""
+    """Seed B's filter, map and all, from ``mean (3,)``, ``cov (3, 3)``; moments lifted to first order."""
     return _carleman(mean, cov, capacity, "first_order")
 
 

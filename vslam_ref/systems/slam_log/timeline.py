@@ -33,7 +33,7 @@ class Timeline(NamedTuple):
         ds (m) and dalpha (rad) of each step.
     cov : ndarray, shape (K, 2, 2)
         Their covariances.
-    sighting_at, record_at : ndarray of int
+    sighting_at, record_at : ndarray of int, shapes (S,), (R,)
         Index of the cut at which each sighting was taken, and each record is to be made.
     """
 
@@ -45,7 +45,7 @@ class Timeline(NamedTuple):
 
 
 def control_increments(log: SlamLog, calibration: Calibration) -> Array:
-    """Calibrated ds and dalpha of each control interval, shape (T - 1, 2).
+    """Calibrated ds (metres) and dalpha (radians) of each control interval, shape (T - 1, 2).
 
     Implements :eq:`eq-b4` (B4) for an Ackermann log.
     """
@@ -80,7 +80,7 @@ def increment_variances(increments: Array, calibration: Calibration) -> Array:
 
 
 def sighting_times(log: SlamLog, calibration: Calibration) -> Array:
-    """When each sighting was taken, held inside the log, shape (S,)."""
+    """When each sighting was taken, seconds, held inside the log, shape (S,)."""
     taken = np.array([s.time for s in log.sightings]) - calibration.sighting_delay
     return np.clip(taken, log.times[0], log.times[-1])
 

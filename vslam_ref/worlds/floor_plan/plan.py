@@ -134,14 +134,14 @@ class FloorPlan:
     ----------
     walls : ndarray, shape (m, 4)
         Segments, metres.
+    zones : ndarray, shape (z, 4)
+        Rectangles ``(xmin, ymin, xmax, ymax)`` where people walk; zone 0 is the one that the gates lead to.
+    route : ndarray, shape (k, 2)
+        Where the robot goes, from point to point.
     furniture, things : tuple of Box
         What never moves, and what is moved.
     doors : tuple of Door
-    zones : ndarray, shape (z, 4)
-        Rectangles ``(xmin, ymin, xmax, ymax)`` where people walk; zone 0 is the one that the gates lead to.
     gates : tuple of Gate
-    route : ndarray, shape (k, 2)
-        Where the robot goes, from point to point.
     """
 
     walls: Array
