@@ -60,8 +60,8 @@ class Walks(NamedTuple):
     ``columns (B,)`` and ``last_row (B,)`` count cells; ``offset (B,)``, ``rise (B,)`` and ``run (B,)`` are in
     squared quanta, so ratios of them are cells.  All columns are crossed; at column ``k`` the beam enters
     ``(rise k + offset) / run`` cells above its first row; ``last_row`` is the row in which it ends.
-    ``start`` (B, 2) is the first cell (x, y), ``signs`` (B, 2) mark the mirrored axes, ``steep (B,)`` the beams
-    whose columns are rows.
+    ``start`` (B, 2) is the first cell (x, y), ``signs`` (B, 2) mark the mirrored axes, ``steep (B,)`` the
+    beams whose columns are rows.
     """
 
     columns: IntArray

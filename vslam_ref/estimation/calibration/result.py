@@ -11,7 +11,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import Point
+from vslam_ref.estimation.calibration.problem import CalibrationIterate
 from vslam_ref.estimation.calibration.start import Start
 from vslam_ref.estimation.least_squares import Iteration
 from vslam_ref.estimation.least_squares.result import CONVERGED, Reason
@@ -138,14 +138,14 @@ class Certainty(NamedTuple):
     undetermined: str
 
 
-def certainty(point: Point, free: Free) -> Certainty:
+def certainty(point: CalibrationIterate, free: Free) -> Certainty:
     """Covariance of the intrinsics, the poses unknown, from the reduced system.
 
     Implements :eq:`eq-calibration-covariance`.
 
     Parameters
     ----------
-    point : Point
+    point : CalibrationIterate
         The solution.
     free : Free
         Its free parameters.
@@ -182,7 +182,7 @@ def certainty(point: Point, free: Free) -> Certainty:
     return Certainty(sigma, cov, _vague(point, cov))
 
 
-def _vague(point: Point, cov: Array) -> str:
+def _vague(point: CalibrationIterate, cov: Array) -> str:
     """Focal length or principal point with a large standard deviation."""
     deviation, focal = np.sqrt(np.diag(cov))[:4], point.state.params[:2]
     share = deviation / np.tile(focal, 2)
@@ -197,7 +197,7 @@ def _vague(point: Point, cov: Array) -> str:
     return f"{groups}{_flat(point)}"
 
 
-def _flat(point: Point) -> str:
+def _flat(point: CalibrationIterate) -> str:
     """Why the sensor is not determined, where the boards' directions show it."""
     T = point.state.T_cam_board
     largest = float(tilt(T).max())

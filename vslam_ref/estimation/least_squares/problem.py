@@ -25,7 +25,7 @@ Function = Callable[[Any], ArrayLike]
 Plus = Callable[[Array, Array], Array]
 
 
-class Point(NamedTuple):
+class Iterate(NamedTuple):
     """Everything known at one x.
 
     Attributes
@@ -38,7 +38,7 @@ class Point(NamedTuple):
     scale : ndarray, shape (n,)
         Diagonal of D.
     gradient_norm, stiffness : float
-        As in :class:`~vslam_ref.estimation.least_squares.questions.Linearised`.
+        As in :class:`~vslam_ref.estimation.least_squares.questions.LinearModel`.
     """
 
     x: Array
@@ -107,7 +107,7 @@ class Problem:
         """Cost of each block, (m / block,), finite or not."""
         return self._costs(self.residual_at(x))
 
-    def linearise(self, x: Array, before: Point | None = None) -> Point | None:
+    def linearise(self, x: Array, before: Iterate | None = None) -> Iterate | None:
         """Residual, weights and Jacobian at x; None where one of them is not finite.
 
         Implements :eq:`eq-linearised` and :eq:`eq-reweighted`.
@@ -127,9 +127,9 @@ class Problem:
             gradient_norm(rows, target, lengths),
             float(np.max(lengths / scale, initial=0.0)) ** 2,
         )
-        return Point(x, residual, costs, weights, jacobian, rows, target, scale, slope, stiffness)
+        return Iterate(x, residual, costs, weights, jacobian, rows, target, scale, slope, stiffness)
 
-    def step(self, here: Point, damping: float) -> Step | None:
+    def step(self, here: Iterate, damping: float) -> Step | None:
         """Damped step and its promise, the denominator of :eq:`eq-gain-ratio`."""
         change = damped_step(here.rows, here.target, damping, here.scale)
         if change is None:
@@ -139,7 +139,7 @@ class Problem:
         promised = 0.5 * float(np.sum((here.rows @ change) ** 2)) + damping * length**2  # eq-gain-ratio
         return Step(change, length, promised, length / max(float(np.linalg.norm(size)), 1e-300))
 
-    def move(self, here: Point, step: Step) -> Array:
+    def move(self, here: Iterate, step: Step) -> Array:
         """Return x after a step."""
         return self.plus(here.x, step.change)
 

@@ -89,7 +89,7 @@ class Crossing(NamedTuple):
     J_angle: Array
 
 
-class Corners(NamedTuple):
+class ScanCorners(NamedTuple):
     """Corners of one scan, in the laser's frame.
 
     Attributes
@@ -220,7 +220,7 @@ def straight_runs(points: Array, config: CornerConfig) -> list[tuple[int, int]]:
     return runs
 
 
-def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | None = None) -> Corners:
+def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | None = None) -> ScanCorners:
     """Corners that one scan shows.
 
     Parameters
@@ -232,7 +232,7 @@ def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | No
 
     Returns
     -------
-    Corners
+    ScanCorners
         With the covariance of both lines, :eq:`eq-corner-cov`; possibly none.
 
     Raises
@@ -270,7 +270,7 @@ def _long_runs(points: Array, c: CornerConfig) -> list[tuple[int, int]]:
     return kept
 
 
-def _meet(lines: Lines, c: CornerConfig) -> Corners:
+def _meet(lines: Lines, c: CornerConfig) -> ScanCorners:
     """Corners of neighbouring lines whose ends come near to where they cross."""
     n = len(lines.angle)
     pair = np.stack([np.arange(n - 1), np.arange(1, n)], 1) if n > 1 else np.zeros((0, 2), dtype=np.int64)
@@ -291,4 +291,4 @@ def _meet(lines: Lines, c: CornerConfig) -> Corners:
     opening = np.abs(so2.wrap(on - back))
     bisector = so2.wrap(back + so2.wrap(on - back) / 2)
     towards = np.cos(bisector) * xy[:, 0] + np.sin(bisector) * xy[:, 1]
-    return Corners(xy, cov, bisector, opening, towards > 0.0, np.stack([back, on], 1))
+    return ScanCorners(xy, cov, bisector, opening, towards > 0.0, np.stack([back, on], 1))
