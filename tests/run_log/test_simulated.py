@@ -66,8 +66,8 @@ def test_what_is_written_is_read(world: Eight, tmp_path: Path) -> None:
         np.testing.assert_array_equal(a.polar, b.polar)
         assert abs(a.time - b.time) < 4e-13
     np.testing.assert_array_equal(known.landmarks, truth.landmarks)
-    np.testing.assert_array_equal(known.poses[:, :2], truth.poses[:, :2])
-    assert np.abs(np.sin(known.poses[:, 2] - truth.poses[:, 2])).max() < 1e-14
+    np.testing.assert_array_equal(known.T_world_vehicle[:, :2], truth.T_world_vehicle[:, :2])
+    assert np.abs(np.sin(known.T_world_vehicle[:, 2] - truth.T_world_vehicle[:, 2])).max() < 1e-14
 
 
 def test_the_format_has_no_place_for_other_drives_and_robots(world: Eight, tmp_path: Path) -> None:
