@@ -54,8 +54,8 @@ class Robust:
     def __post_init__(self) -> None:
         numbers = [self.least_scale] + ([] if self.scale == "adaptive" else [self.scale])
         if not all(isinstance(s, float | int) and s > 0 for s in numbers):
-            told = "need a number > 0, or 'adaptive' for the scale"
-            raise ValueError(f"scale={self.scale!r}, least_scale={self.least_scale!r}: {told}")
+            what = "need a number > 0, or 'adaptive' for the scale"
+            raise ValueError(f"scale={self.scale!r}, least_scale={self.least_scale!r}: {what}")
 
     def sigma(self, errors: Array, valid: BoolArray) -> float:
         """Scale for whitened errors (n, 2), of which the valid ones count."""

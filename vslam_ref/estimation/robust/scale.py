@@ -158,8 +158,8 @@ def _scale(sizes: Array, factor: float, measured: int, fitted: int | None) -> Sc
     if fitted is not None:
         small = small_sample_factor(measured, fitted)
         if math.isinf(small):
-            told = f"{measured} measurements for {fitted} parameters"
-            return Scale(math.inf, f"{told}: no redundancy, the scale is unknown")
+            have = f"{measured} measurements for {fitted} parameters"
+            return Scale(math.inf, f"{have}: no redundancy, the scale is unknown")
         factor *= small
     sigma = factor * float(np.median(sizes))
     return Scale(sigma, "median" if sigma > 0.0 else "more than half of the errors are zero")
