@@ -67,7 +67,7 @@ def logged_increments(increments: ArrayLike, calibration: RobotCalibration) -> A
 
     Examples
     --------
-    >>> logged_increments([[0.5, 0.1]], Calibration(distance_gain=0.5, turn_gain=2.0, drift=0.2))
+    >>> logged_increments([[0.5, 0.1]], RobotCalibration(distance_gain=0.5, turn_gain=2.0, drift=0.2))
     array([[1., 0.]])
     """
     ds, dalpha = np.asarray(increments, dtype=np.float64).T
