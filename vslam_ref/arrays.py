@@ -43,7 +43,7 @@ def times(M: Array, x: Array) -> Array:
 def blocks(rows: Sequence[Sequence[Any]]) -> Array:
     """Join blocks whose batch axes broadcast; a number stands for a block filled with it.
 
-    Block sizes come from the first block of the row or column that is no number.
+    Block sizes come from the first block of the row or column that is not a number.
     """
     arrays = [[np.asarray(block, dtype=np.float64) for block in row] for row in rows]
     heights = [next(block.shape[-2] for block in row if block.ndim) for row in arrays]

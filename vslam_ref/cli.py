@@ -93,7 +93,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {vslam_ref.__version__}")
     commands = parser.add_subparsers(
-        metavar="COMMAND", dest="command", required=True, help="'vslam-ref COMMAND --help' tells more"
+        metavar="COMMAND", dest="command", required=True, help="'vslam-ref COMMAND --help' shows more"
     )
     for name, module in COMMANDS.items():
         command = commands.add_parser(
@@ -116,7 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Notes
     -----
-    ``VSLAM_REF_DEBUG=1`` shows the traceback of an error that would be told in one line.
+    ``VSLAM_REF_DEBUG=1`` shows the traceback of an error that would be reported in one line.
     """
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -142,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _is_numeric(error: Exception) -> bool:
-    """Tell a failed factorisation, which NumPy calls a ValueError, from bad input."""
+    """Distinguish a failed factorisation, which NumPy calls a ValueError, from bad input."""
     return type(error).__name__ == "LinAlgError"
 
 

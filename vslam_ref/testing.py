@@ -33,7 +33,19 @@ _STEP = EPS ** (1 / 7)
 
 
 class JacobianCheck(NamedTuple):
-    """Numeric Jacobian, its entry-wise tolerance, largest error over tolerance, and the method used."""
+    """What a comparison found.
+
+    Attributes
+    ----------
+    numeric : ndarray, shape (m, n)
+        Numeric Jacobian, in the units of the function's value over those of its argument.
+    tolerance : ndarray, shape (m, n)
+        What each entry may differ by.
+    worst : float
+        Largest error over tolerance.
+    method : str
+        Complex step or central differences.
+    """
 
     numeric: Array
     tolerance: Array
@@ -57,7 +69,7 @@ def check_jacobian(
     function : callable
         Maps an array of shape (n,) to one of shape (m,).
     at : array_like, shape (n,)
-        Where to differentiate.  Choose it away from identity and zeros, where mistakes hide.
+        Where to differentiate, in any unit.  Choose it away from identity and zeros, where mistakes hide.
     jacobian : array_like, shape (m, n)
         What is to be checked: column j is the derivative in ``at[j]``.
     method : {"auto", "complex", "central"}
@@ -169,7 +181,7 @@ def _central(
 
 
 class ConsistencyCheck(NamedTuple):
-    """Mean of the runs and the band it had to lie in."""
+    """Mean of the runs and the band it had to lie in; NEES is dimensionless."""
 
     mean: float
     lower: float
@@ -251,7 +263,7 @@ def assert_group_axioms(group: Any, samples: ArrayLike, *, roundings: int = 64) 
     group : module or object
         For example :mod:`vslam_ref.geometry.se2`.
     samples : array_like, shape (N, ...)
-        Elements: near the identity, generic, near every angle where a branch changes.
+        Elements, of any unit: near the identity, generic, near every angle where a branch changes.
     roundings : int
         How many rounding errors one product of matrices may gather.
 

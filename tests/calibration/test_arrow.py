@@ -7,7 +7,7 @@ import pytest
 
 from vslam_ref.estimation import least_squares
 from vslam_ref.estimation.calibration import Board, Free, State, calibrate, stack
-from vslam_ref.estimation.calibration.arrow import Arrow, Blocks, arrow, damped_step, promised, reduce
+from vslam_ref.estimation.calibration.arrow import Arrow, ArrowVector, arrow, damped_step, promised, reduce
 from vslam_ref.estimation.calibration.problem import residual, residual_with_jacobians
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Radtan
@@ -68,7 +68,7 @@ def test_singular_systems_are_none() -> None:
     _, _, normal, _ = dense()
     lost = normal._replace(A=np.zeros_like(normal.A), B=np.zeros_like(normal.B))
     assert reduce(lost) is None
-    assert damped_step(lost, 0.0, Blocks(np.ones((4, 6)), np.ones(4))) is None
+    assert damped_step(lost, 0.0, ArrowVector(np.ones((4, 6)), np.ones(4))) is None
 
 
 def test_the_dense_solver_finds_the_same_camera_and_covariance() -> None:

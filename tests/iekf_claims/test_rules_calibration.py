@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from vslam_ref.experiments.iekf import SENTENCES, evaluate
-from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.rules import MARKED
 from vslam_ref.metrics import consistency
 
@@ -32,8 +32,8 @@ def test_a_consistent_filter_is_accused_at_the_stated_rate(studies, fresh_curves
     the binomial chance is under 1e-4.
     """
     (e,) = evaluate(studies["calm"], [claim], np.random.default_rng(9))
-    scene = Scene(studies["calm"]["time"], 80.0, 50)
-    values = e.sentence.rule.measure.compute((fresh_curves,), scene)
+    clock = StudyClock(studies["calm"]["time"], 80.0, 50)
+    values = e.sentence.rule.measure.compute((fresh_curves,), clock)
     accused = np.count_nonzero(values > e.threshold)
     if e.sentence.rule.effect is not None and e.sentence.rule.effect >= MARKED:
         assert accused <= stats.binom(STUDIES, 0.074).ppf(1 - 1e-4), (
@@ -46,8 +46,8 @@ def test_a_consistent_filter_is_accused_at_the_stated_rate(studies, fresh_curves
 def test_the_naive_readings_accuse_a_consistent_filter(studies, fresh_curves):
     """What calibration is for: consistent studies cross the line somewhere in lap 1 far oftener than 5 %."""
     rule = SENTENCES["iekf-high-above-in-lap1"].rule
-    scene = Scene(studies["calm"]["time"], 80.0, 50)
-    crossed = np.count_nonzero(rule.naive.holds((fresh_curves,), scene))
+    clock = StudyClock(studies["calm"]["time"], 80.0, 50)
+    crossed = np.count_nonzero(rule.naive.holds((fresh_curves,), clock))
     # more than even twice the promised rate would give, chance 1e-6
     assert crossed > stats.binom(STUDIES, 0.10).ppf(1 - 1e-6)
 
@@ -74,18 +74,18 @@ def test_swapping_labels_twice_is_no_swap(studies):
 
 def test_effect_words_are_what_they_are_derived_from():
     assert pytest.approx(consistency.mean_line(50) / 3, abs=5e-4) == MARKED
-    scene = Scene(np.arange(1601) * 0.1, 80.0, 50)
-    assert round(scene.line, 3) == 3.592
-    assert round(scene.inflation, 3) == 1.328
+    clock = StudyClock(np.arange(1601) * 0.1, 80.0, 50)
+    assert round(clock.line, 3) == 3.592
+    assert round(clock.inflation, 3) == 1.328
 
 
 def test_windows_are_the_ones_in_the_text():
-    scene = Scene(np.arange(1601) * 0.1, 80.0, 50)
+    clock = StudyClock(np.arange(1601) * 0.1, 80.0, 50)
     spans = {
         name: (
-            scene.time[scene.window(name)][0],
-            scene.time[scene.window(name)][-1],
-            scene.window(name).sum(),
+            clock.time[clock.window(name)][0],
+            clock.time[clock.window(name)][-1],
+            clock.window(name).sum(),
         )
         for name in ("lap 1", "lap 2", "both laps", "before closure", "after closure", "closure", "end")
     }

@@ -13,8 +13,8 @@ from vslam_ref.geometry import so2
 from vslam_ref.grids import Lattice, LogOddsGrid
 from vslam_ref.grids.landmarks import (
     CornerConfig,
-    Corners,
     MatchConfig,
+    ScanCorners,
     book,
     distance_field,
     map_corners,
@@ -114,7 +114,7 @@ def state(seed: int) -> tuple[GridSlam, np.ndarray, np.ndarray, list[book.Corner
     return slam, x, P, marks
 
 
-def shown(x: np.ndarray, rng: np.random.Generator) -> tuple[Corners, list[book.Corner]]:
+def shown(x: np.ndarray, rng: np.random.Generator) -> tuple[ScanCorners, list[book.Corner]]:
     """Six corners near landmarks, some far off or of another kind."""
     corners = []
     for k in (0, 1, 1, 2, 3, 3):
@@ -124,7 +124,7 @@ def shown(x: np.ndarray, rng: np.random.Generator) -> tuple[Corners, list[book.C
         kind = bool(k < 3) if rng.random() < 0.8 else bool(k >= 3)
         corners.append(book.Corner(corner, np.diag(rng.uniform(1e-4, 1e-3, 2)), 0.3, 1.6, kind))
     arrays = (np.array([getattr(z, name) for z in corners]) for name in book.Corner._fields)
-    return Corners(*arrays, np.zeros((6, 2))), corners
+    return ScanCorners(*arrays, np.zeros((6, 2))), corners
 
 
 def localised(seed: int) -> tuple[list[int], list[int], float]:

@@ -8,23 +8,28 @@ import numpy as np
 import pytest
 
 from vslam_ref.grids import LogOddsGrid, Scan
-from vslam_ref.grids.landmarks import Corners, LandmarkConfig, LandmarkMap
+from vslam_ref.grids.landmarks import LandmarkConfig, LandmarkMap, ScanCorners
 
 POSE = np.array([0.0, 0.0, 0.0])
 L_SHAPE = [(20, c) for c in range(20, 50)] + [(r, 20) for r in range(20, 50)]
 
 
-def corners_at(*places: tuple[float, float], convex: bool = True) -> Corners:
+def corners_at(*places: tuple[float, float], convex: bool = True) -> ScanCorners:
     """Corners with arms to the right and upwards, as the L's."""
     n = len(places)
-    return Corners(
+    return ScanCorners(
         np.array(places), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.full(n, np.pi / 4), np.full(n, np.pi / 2),
         np.full(n, convex), np.tile([np.pi / 2, 0.0], (n, 1)),
     )  # fmt: skip
 
 
 def show(
-    marks: LandmarkMap, grid: LogOddsGrid, corners: Corners, places: np.ndarray, times: int, first: int = 0
+    marks: LandmarkMap,
+    grid: LogOddsGrid,
+    corners: ScanCorners,
+    places: np.ndarray,
+    times: int,
+    first: int = 0,
 ) -> int:
     """Show the same corners in some scans; how many landmarks came of it."""
     before = len(marks.landmarks)

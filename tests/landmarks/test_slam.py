@@ -212,7 +212,7 @@ def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:
     covariance: S = J P J^T + cov_z by brute force.
     """
     from vslam_ref.filters import observation
-    from vslam_ref.grids.landmarks import Corners
+    from vslam_ref.grids.landmarks import ScanCorners
     from vslam_ref.grids.landmarks.landmark_map import Landmark
 
     slam = GridSlam([0.0, 0.0, 0.0], start_sigma=(1.0, 1e-3))
@@ -226,7 +226,7 @@ def test_the_gate_counts_the_pose_and_the_landmark_together() -> None:
     assert np.sqrt(S.max()) < 0.05
     for step, expected in ((2.9, 0), (3.2, -1)):  # sigmas; the gate is 3.03
         way = np.linalg.cholesky(S) @ [step, 0.0]
-        corner = Corners(
+        corner = ScanCorners(
             (z + way)[None],
             cov_z[None],
             np.array([0.3]),

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import mrclam
-from vslam_ref.systems.slam_log import Calibration, simulated
+from vslam_ref.systems.slam_log import RobotCalibration, simulated
 from vslam_ref.worlds import figure_eight
 
 LANDMARKS = np.array([[0.5, 4.2], [-3.8, 0.4], [0.3, -4.0], [4.1, 0.2], [2.9, 3.1], [-2.7, -3.0]])
-CALIBRATION = Calibration(
+CALIBRATION = RobotCalibration(
     sigma_distance=0.02, sigma_turn=0.02, sigma_drift=0.02, sigma_range=0.05, sigma_bearing=0.02
 )
 
@@ -31,12 +31,12 @@ class World(NamedTuple):
 def make_world(tmp_path: Path) -> Callable[..., World]:
     """Return a writer of worlds; call it with a name, a noise (or None for none) and a seed."""
 
-    def make(name: str, noise: Calibration | None, seed: int = 0, seconds: float = 60.0) -> World:
+    def make(name: str, noise: RobotCalibration | None, seed: int = 0, seconds: float = 60.0) -> World:
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
         world = figure_eight.drive(figure_eight.EightConfig(seconds=seconds, turn_rate=0.3), LANDMARKS)
         rng = np.random.default_rng(seed) if noise is not None else None
-        log, truth = simulated.log(world, noise or Calibration(), rng)
+        log, truth = simulated.log(world, noise or RobotCalibration(), rng)
         mrclam.write(folder, 1, log, truth)
         return World(folder, world.times, world.poses)
 
@@ -44,6 +44,6 @@ def make_world(tmp_path: Path) -> Callable[..., World]:
 
 
 @pytest.fixture
-def calibration() -> Calibration:
+def calibration() -> RobotCalibration:
     """Noises of the simulated world."""
     return CALIBRATION

@@ -15,7 +15,7 @@ from vslam_ref.experiments.slam_log import compare
 from vslam_ref.filters import vehicle
 from vslam_ref.metrics.alignment import align_rigid
 from vslam_ref.systems.slam_log import (
-    Calibration,
+    RobotCalibration,
     RunSettings,
     SlamLog,
     build_timeline,
@@ -30,13 +30,13 @@ CERTAIN = RunSettings(start_sigma_position=0.0, start_sigma_heading=0.0)
 
 
 def read(
-    make_world: Callable[..., object], calibration: Calibration | None, seed: int = 0
+    make_world: Callable[..., object], calibration: RobotCalibration | None, seed: int = 0
 ) -> tuple[SlamLog, object]:
     log = mrclam.read_log(make_world(f"b{seed}", calibration, seed).folder, 1)
     return log, mrclam.read_truth(make_world(f"b{seed}", calibration, seed).folder, 1, log)
 
 
-def test_preintegrated_covariance_is_that_of_sampled_noise(calibration: Calibration) -> None:
+def test_preintegrated_covariance_is_that_of_sampled_noise(calibration: RobotCalibration) -> None:
     """4000 draws: a variance's relative error is sqrt(2/4000) = 2 %; 10 % is 4.5 of them."""
     rng = np.random.default_rng(1)
     times = np.arange(0.0, 6.01, 0.1)
@@ -66,7 +66,7 @@ def test_dead_reckoning_moves_along_the_middle_heading() -> None:
 
 
 def test_the_jacobian_is_that_of_the_residuals(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Central differences, step 1e-6: rounding of 1e-16 / 1e-6, times the whitening of up to 1e4."""
     log, _ = read(make_world, calibration)
@@ -95,7 +95,7 @@ def test_the_jacobian_is_that_of_the_residuals(
 
 
 def test_the_batch_is_at_least_as_likely_as_the_filters_and_as_accurate(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Mean over 5 worlds: smoothing cannot lose to filtering beyond chance."""
     gains = []
@@ -110,7 +110,7 @@ def test_the_batch_is_at_least_as_likely_as_the_filters_and_as_accurate(
 
 
 def test_batch_poses_stand_at_the_sightings(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     log, _ = read(make_world, calibration)
     start = run_log(log, calibration, "ekf", replace(CERTAIN, record_period=0.5))
@@ -123,7 +123,7 @@ def test_batch_poses_stand_at_the_sightings(
 
 
 def test_gains_and_offsets_are_found_without_truth(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Distort a log by known gains: each is found again within 4 of its own standard errors."""
     log, _ = read(make_world, calibration, 11)
@@ -146,7 +146,7 @@ def test_gains_and_offsets_are_found_without_truth(
 
 @pytest.mark.slow
 def test_the_likeliest_noises_are_those_of_the_world(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Sensor noises of a log within 4 standard errors: about 1 / sqrt(2 x 400 sightings) = 3.5 % each."""
     log, _ = read(make_world, calibration, 12)
@@ -163,7 +163,7 @@ def test_every_unknown_has_a_step() -> None:
 
 
 def test_alignment_of_the_batch_is_not_its_start(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """The first pose is held at the filter's start: the origin of the run's frame.
 

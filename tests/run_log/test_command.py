@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("scipy.sparse", reason="the batch solution")
 
 from vslam_ref import cli
-from vslam_ref.systems.slam_log import KEYS, Calibration
+from vslam_ref.systems.slam_log import KEYS, RobotCalibration
 
 NOISE = [
     f"calibration.{key}={value}"
@@ -27,7 +27,7 @@ SET = [word for setting in NOISE for word in ("--set", setting)]
 
 
 @pytest.fixture
-def folder(make_world: Callable[..., object], calibration: Calibration) -> Path:
+def folder(make_world: Callable[..., object], calibration: RobotCalibration) -> Path:
     """Return the folder of a simulated noisy log of 30 s."""
     return make_world("set", calibration, 1, seconds=30.0).folder  # type: ignore[attr-defined]
 

@@ -12,7 +12,7 @@ pytest.importorskip("scipy.sparse", reason="identification")
 
 from vslam_ref.commands.identify import read_logs
 from vslam_ref.datasets import catalogue, mrclam, noise
-from vslam_ref.systems.slam_log import Calibration, identify, run_log
+from vslam_ref.systems.slam_log import RobotCalibration, identify, run_log
 
 NAMES = ("mrclam", "victoria_park")
 
@@ -20,7 +20,7 @@ NAMES = ("mrclam", "victoria_park")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_document_says_what_why_and_how(name: str) -> None:
     document = noise.document(name)
-    assert noise.calibration(name) == Calibration.from_mapping(document["values"])
+    assert noise.calibration(name) == RobotCalibration.from_mapping(document["values"])
     assert document["command"] == f"vslam-ref identify {name}"
     assert document["evidence"]["truth_used"] is False
     assert len(document["method"]) > 200
@@ -35,7 +35,7 @@ def test_an_unknown_set_is_told_with_the_known_ones() -> None:
 
 
 def test_identification_opens_no_truth(
-    make_world: Callable[..., object], calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+    make_world: Callable[..., object], calibration: RobotCalibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The truth files are gone, and opening them would be told by the reader's own function too."""
     folder: Path = make_world("w", calibration, 2, seconds=30.0).folder  # type: ignore[attr-defined]
@@ -44,13 +44,13 @@ def test_identification_opens_no_truth(
     monkeypatch.setattr(mrclam, "read_truth", lambda *_: pytest.fail("the truth was opened"))
     monkeypatch.setattr(identify, "STRIDES", (1.0,))
     found = identify.identify([mrclam.read_log(folder, 1)], calibration, ("turn_gain", "bearing_offset"))
-    values = Calibration.from_mapping(found["values"])
+    values = RobotCalibration.from_mapping(found["values"])
     assert values.sigma_range == pytest.approx(0.05, rel=0.3)
     assert values.turn_gain == pytest.approx(1.0, abs=0.05)
 
 
 def test_sightings_repeated_at_rest_show_the_sensor_noise(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Differences at rest over sqrt(2) spread like the noise; within 4 standard errors of about 5 %."""
     log = mrclam.read_log(make_world("w", calibration, 5).folder, 1)  # type: ignore[attr-defined]
@@ -70,7 +70,7 @@ def test_the_committed_noises_are_likelier_than_their_neighbours() -> None:
     logs = read_logs("mrclam")
     values = noise.calibration("mrclam")
 
-    def likelihood(calibration: Calibration) -> float:
+    def likelihood(calibration: RobotCalibration) -> float:
         runs = [
             (run_log(log, calibration, name, identify.SETTINGS), log)
             for name in identify.JUDGES

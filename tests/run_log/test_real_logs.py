@@ -21,9 +21,9 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.systems.slam_log import (
     FILTERS,
     LogRun,
+    LogTruth,
     RunSettings,
     SlamLog,
-    Truth,
     place,
     run_log,
     summary,
@@ -50,7 +50,7 @@ QUICK = RunSettings(max_step=0.2, record_period=0.2)
 
 
 @cache
-def robot(number: int) -> tuple[SlamLog, Truth]:
+def robot(number: int) -> tuple[SlamLog, LogTruth]:
     folder = mrclam.set_folder(catalogue.require("utias_mrclam"))
     log = mrclam.read_log(folder, number)
     return log, mrclam.read_truth(folder, number, log)

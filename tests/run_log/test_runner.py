@@ -15,7 +15,7 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.metrics.alignment import align_rigid
 from vslam_ref.systems.slam_log import (
     FILTERS,
-    Calibration,
+    RobotCalibration,
     RunSettings,
     SlamLog,
     build_timeline,
@@ -30,7 +30,7 @@ CERTAIN = RunSettings(start_sigma_position=0.0, start_sigma_heading=0.0)
 
 @pytest.mark.parametrize("name", ["ekf", "ekf-anchored", iekf_first_order])
 def test_a_noise_free_log_gives_back_its_world(
-    make_world: Callable[..., object], calibration: Calibration, name: str | Build
+    make_world: Callable[..., object], calibration: RobotCalibration, name: str | Build
 ) -> None:
     """Every filter whose mean is the motion itself, reader included.  (Exact moments shorten a mean.)
 
@@ -48,7 +48,7 @@ def test_a_noise_free_log_gives_back_its_world(
 
 
 def test_the_filters_are_consistent_in_a_world_of_their_own_noises(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Final pose NEES of 20 runs: chi-squared, 60 degrees of freedom in sum; 1 false alarm in 1000."""
     stats = pytest.importorskip("scipy.stats")
@@ -70,7 +70,7 @@ def test_the_filters_are_consistent_in_a_world_of_their_own_noises(
 
 
 def test_wrong_sightings_are_counted_and_do_no_harm(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     world = make_world("w", calibration, 3)
     path = world.folder / "Robot1_Measurement.dat"
@@ -91,7 +91,7 @@ def test_wrong_sightings_are_counted_and_do_no_harm(
 
 
 def test_a_rejected_sighting_leaves_the_filter_as_it_was(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     world = make_world("w", calibration, 4)
     log = mrclam.read_log(world.folder, 1)
@@ -137,7 +137,7 @@ def test_a_deep_copy_of_a_filter_goes_its_own_way(name: str) -> None:
         np.testing.assert_array_equal(got.landmarks().mean, wanted.landmarks().mean)
 
 
-def test_the_timeline_keeps_way_turn_and_variance_whatever_the_step(calibration: Calibration) -> None:
+def test_the_timeline_keeps_way_turn_and_variance_whatever_the_step(calibration: RobotCalibration) -> None:
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.0, 0.1, 300))
     times[100] = times[99]  # two stamps at one time: an interval of no length
@@ -156,7 +156,7 @@ def test_the_timeline_keeps_way_turn_and_variance_whatever_the_step(calibration:
 
 
 def test_longer_steps_change_the_trajectory_by_little(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Summing to 0.1 s turns a step by at most 0.3 rad/s x 0.1 s / 2 sideways: ds x 0.015, 0.75 mm a step.
 
@@ -170,7 +170,7 @@ def test_longer_steps_change_the_trajectory_by_little(
 
 
 def test_a_sighting_is_used_when_it_was_taken(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """A log whose sightings are stamped 0.3 s late is made good by the delay, and only by it."""
     world = make_world("w", None)
@@ -184,7 +184,7 @@ def test_a_sighting_is_used_when_it_was_taken(
 
 
 def test_truth_of_an_antenna_ahead_is_compared_with_the_antenna(
-    make_world: Callable[..., object], calibration: Calibration
+    make_world: Callable[..., object], calibration: RobotCalibration
 ) -> None:
     """Truth moved 2 m ahead and 0.5 m to the left of the vehicle: with the lever nothing changes."""
     world = make_world("w", None)
@@ -203,7 +203,7 @@ def test_truth_of_an_antenna_ahead_is_compared_with_the_antenna(
     assert plain["rmse_position_m"] > 0.5
 
 
-def test_bad_settings_and_logs_are_refused(calibration: Calibration) -> None:
+def test_bad_settings_and_logs_are_refused(calibration: RobotCalibration) -> None:
     empty = SlamLog("x", "differential", np.nan, 0.0, np.arange(3.0), np.zeros((3, 2)), (), {})
     with pytest.raises(ValueError, match="no sighting"):
         run_log(empty, calibration, "ekf")
@@ -212,7 +212,7 @@ def test_bad_settings_and_logs_are_refused(calibration: Calibration) -> None:
     with pytest.raises(ValueError, match="sigma_range=0"):
         replace(calibration, sigma_range=0.0)
     with pytest.raises(ValueError, match="unknown value 'sigma_rang'"):
-        Calibration.from_mapping({"sigma_rang": 1})
+        RobotCalibration.from_mapping({"sigma_rang": 1})
     with pytest.raises(ValueError, match="gate=-1"):
         RunSettings(gate=-1.0)
 
@@ -227,7 +227,9 @@ def test_alignment_finds_the_motion_that_was_applied() -> None:
         align_rigid(points[:1], moved[:1])
 
 
-def test_the_filter_class_may_be_given(make_world: Callable[..., object], calibration: Calibration) -> None:
+def test_the_filter_class_may_be_given(
+    make_world: Callable[..., object], calibration: RobotCalibration
+) -> None:
     world = make_world("w", None, seconds=20.0)
     log = mrclam.read_log(world.folder, 1)
     by_name, by_class = run_log(log, calibration, "ekf"), run_log(log, calibration, EkfSlam)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import mrclam
-from vslam_ref.systems.slam_log import Calibration, SlamLog, Truth, simulated
+from vslam_ref.systems.slam_log import LogTruth, RobotCalibration, SlamLog, simulated
 from vslam_ref.systems.slam_log.timeline import control_increments, increment_variances
 from vslam_ref.worlds.figure_eight import Eight, EightConfig, drive, scatter
 
-ODD = Calibration(
+ODD = RobotCalibration(
     distance_gain=0.9, turn_gain=1.2, drift=-0.05, sighting_delay=0.2, sensor_ahead=0.3, bearing_offset=0.02,
     range_offset=-0.04, range_cosine=0.9, sigma_distance=0.05, sigma_turn=0.1, sigma_drift=0.03,
     sigma_range=0.02, sigma_bearing=0.01,
@@ -66,13 +66,13 @@ def test_what_is_written_is_read(world: Eight, tmp_path: Path) -> None:
         np.testing.assert_array_equal(a.polar, b.polar)
         assert abs(a.time - b.time) < 4e-13
     np.testing.assert_array_equal(known.landmarks, truth.landmarks)
-    np.testing.assert_array_equal(known.poses[:, :2], truth.poses[:, :2])
-    assert np.abs(np.sin(known.poses[:, 2] - truth.poses[:, 2])).max() < 1e-14
+    np.testing.assert_array_equal(known.T_world_vehicle[:, :2], truth.T_world_vehicle[:, :2])
+    assert np.abs(np.sin(known.T_world_vehicle[:, 2] - truth.T_world_vehicle[:, 2])).max() < 1e-14
 
 
 def test_the_format_has_no_place_for_other_drives_and_robots(world: Eight, tmp_path: Path) -> None:
     log, truth = simulated.log(world, ODD)
-    bad: list[tuple[int, SlamLog, Truth]] = [
+    bad: list[tuple[int, SlamLog, LogTruth]] = [
         (1, log._replace(drive="ackermann"), truth),
         (6, log, truth),
         (1, log, truth._replace(ids=truth.ids - 2)),

@@ -33,7 +33,7 @@ def _step_rows(v, D, e):
 
 @njit(cache=True)
 def _move(x, P, frame, D, e):
-    """Take the pose, the rows and columns of P (8, 8) and what waits in the frame along."""
+    """Take the pose, the rows and columns of P (8, 8) and what is pending in the frame along."""
     _step_rows(x, D, e)
     for j in range(8):
         _step_rows(P[:, j], D, e)

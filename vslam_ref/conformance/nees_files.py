@@ -101,14 +101,12 @@ def _rows(path: Path) -> Iterator[tuple[int, list[float]]]:
             words = [word.strip() for word in line.split(",")]
             if words == [""] or line.startswith("#"):
                 continue
-            try:
-                values = [float(word) for word in words]
-            except ValueError:
-                if first and not is_number(words[0]):
-                    first = False  # the names of the columns
-                    continue
-                bad = next(word for word in words if not is_number(word))
-                raise ValueError(f"{path}:{number}: {bad[:40]!r} is not a number") from None
+            if first and not is_number(words[0]):
+                first = False  # the names of the columns
+                continue
+            if bad := [word for word in words if not is_number(word)]:
+                raise ValueError(f"{path}:{number}: {bad[0][:40]!r} is not a number")
+            values = [float(word) for word in words]
             if not all(map(math.isfinite, values)):
                 raise ValueError(f"{path}:{number}: a number is not finite")
             first = False

@@ -16,7 +16,7 @@ def write(path: Path, name: str, runs: Runs, found: Judgement) -> None:
     Parameters
     ----------
     path : Path
-        Its suffix tells which.
+        Its suffix says which.
     name : str
         What was judged.
     runs : Runs

@@ -34,7 +34,7 @@ from vslam_ref.datasets.text import (
 )
 from vslam_ref.geometry import so2
 from vslam_ref.support.files import write_text
-from vslam_ref.systems.slam_log.log import Sighting, SlamLog, Truth
+from vslam_ref.systems.slam_log.log import LoggedSighting, LogTruth, SlamLog
 
 ROBOTS = range(1, 6)
 MISREAD_SHARE = 1e-3
@@ -80,7 +80,7 @@ def read_log(folder: Path, robot: int) -> SlamLog:
     )
 
 
-def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
+def read_truth(folder: Path, robot: int, log: SlamLog) -> LogTruth:
     """Read the motion-capture poses of one robot on the time of ``log``, and the true landmarks."""
     poses = read_columns(existing(folder, f"Robot{robot}_Groundtruth.dat"), ("time", "x", "y", "theta"))
     require_order(poses, 0, strict=True)
@@ -95,7 +95,7 @@ def read_truth(folder: Path, robot: int, log: SlamLog) -> Truth:
     )
     pose = poses.values[:, 1:].copy()
     pose[:, 2] = so2.wrap(pose[:, 2])
-    return Truth(
+    return LogTruth(
         times=poses.values[:, 0] - log.clock_start,
         T_world_vehicle=pose,
         max_gap=TRUTH_GAP,
@@ -124,7 +124,9 @@ def _require_distinct(table: Columns, values: IntArray, name: str) -> None:
     )
 
 
-def _read_sightings(folder: Path, robot: int, start: float) -> tuple[tuple[Sighting, ...], dict[str, int]]:
+def _read_sightings(
+    folder: Path, robot: int, start: float
+) -> tuple[tuple[LoggedSighting, ...], dict[str, int]]:
     subject_of = read_barcodes(folder)
     names = ("time", "barcode", "range", "bearing")
     table = read_columns(existing(folder, f"Robot{robot}_Measurement.dat"), names)
@@ -156,7 +158,7 @@ def _require_sane(table: Columns) -> None:
     )
 
 
-def group_sightings(times: Array, ids: IntArray, polar: Array) -> tuple[Sighting, ...]:
+def group_sightings(times: Array, ids: IntArray, polar: Array) -> tuple[LoggedSighting, ...]:
     """Collect rows of one time into sightings; a landmark seen twice at one time begins another."""
     groups: list[list[int]] = []
     for k in range(len(times)):
@@ -165,7 +167,7 @@ def group_sightings(times: Array, ids: IntArray, polar: Array) -> tuple[Sighting
             last.append(k)
         else:
             groups.append([k])
-    return tuple(Sighting(float(times[g[0]]), ids[g], polar[g]) for g in groups)
+    return tuple(LoggedSighting(float(times[g[0]]), ids[g], polar[g]) for g in groups)
 
 
 def set_folder(root: Path) -> Path:
@@ -183,7 +185,7 @@ def set_folder(root: Path) -> Path:
     return found[0]
 
 
-def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
+def write(folder: Path, robot: int, log: SlamLog, truth: LogTruth) -> None:
     """Write log and truth of one robot into a folder, every number in full.
 
     Parameters
@@ -194,7 +196,7 @@ def write(folder: Path, robot: int, log: SlamLog, truth: Truth) -> None:
         1 to 5.
     log : SlamLog
         Of a differential drive.
-    truth : Truth
+    truth : LogTruth
         Its landmarks have numbers from 6 on.
 
     Raises

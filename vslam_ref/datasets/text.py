@@ -95,18 +95,9 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, whole: bool = True) ->
         On a missing file, a damaged archive, or (if ``whole``) more than ``max_bytes``.
     """
     kind = {".gz": "gzip", ".bz2": "bzip2"}.get(path.suffix, "")
-    pieces: list[bytes] = []
-    left = max_bytes
     try:
         with open_packed(path) as stream:
-            if not whole:
-                return stream.read(max_bytes)
-            while piece := stream.read(_PIECE):
-                pieces.append(piece)
-                left -= len(piece)
-                if left < 0:
-                    right = f"expected at most {max_bytes}; is this the right file?"
-                    raise FormatError(path, None, f"more than {max_bytes} bytes unpacked; {right}")
+            return _all_of(stream, path, max_bytes) if whole else stream.read(max_bytes)
     except FileNotFoundError:
         raise FormatError(path, None, "no such file") from None
     except (OSError, EOFError, zlib.error) as error:
@@ -114,6 +105,17 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, whole: bool = True) ->
         if not kind or isinstance(error, IsADirectoryError | PermissionError):
             raise FormatError(path, None, f"cannot be read ({reason}); expected a file") from None
         raise FormatError(path, None, f"damaged {kind} file ({reason}); fetch it again") from None
+
+
+def _all_of(stream: IO[bytes], path: Path, max_bytes: int) -> bytes:
+    pieces: list[bytes] = []
+    left = max_bytes
+    while piece := stream.read(_PIECE):
+        pieces.append(piece)
+        left -= len(piece)
+        if left < 0:
+            right = f"expected at most {max_bytes}; is this the right file?"
+            raise FormatError(path, None, f"more than {max_bytes} bytes unpacked; {right}")
     return b"".join(pieces)
 
 

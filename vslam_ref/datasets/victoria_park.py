@@ -30,7 +30,7 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets import matfile
 from vslam_ref.datasets.mrclam import group_sightings
 from vslam_ref.datasets.text import LARGEST_INTEGER, FormatError, number, read_lines
-from vslam_ref.systems.slam_log.log import SlamLog, Truth
+from vslam_ref.systems.slam_log.log import LogTruth, SlamLog
 
 WHEELBASE = 2.83
 """Distance L between the axles, metres."""
@@ -169,7 +169,7 @@ def _values(path: Path, line: int, words: list[str], names: tuple[str, ...], ext
     return values
 
 
-def read_truth(folder: Path, log: SlamLog) -> Truth:
+def read_truth(folder: Path, log: SlamLog) -> LogTruth:
     """Read the GPS on the time of ``log``: positions of metre level, without heading or map."""
     path = folder / "aa3_gpsx.mat"
     raw = matfile.read_vectors(path, ("timeGps", "Lo_m", "La_m"))
@@ -180,7 +180,7 @@ def read_truth(folder: Path, log: SlamLog) -> Truth:
     xy = np.stack([raw["Lo_m"], raw["La_m"]], -1)
     keep = continuous_fixes(times, xy, log)
     poses = np.column_stack([xy, np.full(len(xy), np.nan)])[keep]
-    return Truth(
+    return LogTruth(
         times=times[keep],
         T_world_vehicle=poses,
         max_gap=GPS_GAP,

@@ -106,7 +106,7 @@ def refine_pose(
     Returns
     -------
     Resection
-        ``reason`` tells of too few points (3 at least), points that the start cannot see, a pose that is
+        ``reason`` reports too few points (3 at least), points that the start cannot see, a pose that is
         not determined, or a solver that did not converge.
 
     Raises
@@ -134,8 +134,8 @@ def refine_pose(
     if len(X) < 3:
         return _failed(camera, X, u, T, f"{len(X)} points: a pose needs at least 3")
     if not seen.all():
-        told = f"{np.count_nonzero(~seen)} of {len(X)} points cannot be seen from the start"
-        return _failed(camera, X, u, T, told)
+        why = f"{np.count_nonzero(~seen)} of {len(X)} points cannot be seen from the start"
+        return _failed(camera, X, u, T, why)
 
     def residual(pose: Array) -> Array:
         return _whitened(camera.pixel_from_world(pose, X), u, sigma)
@@ -182,8 +182,8 @@ def resect(
     X, u, _ = _checked(X_world, uv, sigma_px)
     rays = camera.unproject(u)
     if not rays.valid.all():
-        told = f"{np.count_nonzero(~rays.valid)} of {len(u)} pixels lie outside the camera's invertible field"
-        return _failed(camera, X, u, np.eye(4), told)
+        why = f"{np.count_nonzero(~rays.valid)} of {len(u)} pixels lie outside the camera's invertible field"
+        return _failed(camera, X, u, np.eye(4), why)
     start = resect_linear(rays.bearing, X)
     if not start.ok:
         return _failed(camera, X, u, start.T_cam_world, f"no linear start: {start.reason}")
@@ -241,8 +241,8 @@ def refine_pose_robust(
         left = found.solution.residual.reshape(-1, 2) * sigma
         scale = norm_scale(left, parameters=6)
         if not np.isfinite(scale.sigma):
-            told = f"too few points for a robust loss: {scale.reason}"
-            return replace(found, iterations=tried, converged=False, reason=told)
+            why = f"too few points for a robust loss: {scale.reason}"
+            return replace(found, iterations=tried, converged=False, reason=why)
         sigma, loss, T = max(scale.sigma, least_sigma_px), tuned("tukey", 2), found.T_cam_world
     return replace(found, iterations=tried)
 

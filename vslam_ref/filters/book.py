@@ -108,7 +108,7 @@ def augment(b: Belief, i: int, z: Array, cov_z: Array) -> Belief:
 
 
 def see(b: Belief, ids: Sequence[int], z: Array, cov_z: Array) -> Belief:
-    """Use a sighting: update with the landmarks that are known, then add the new ones."""
+    """Use a sighting, ``z (m, 2)`` with ``cov_z (m, 2, 2)``: update the known landmarks, then add the new."""
     known = [j for j, i in enumerate(ids) if i in b.ids]
     if known:
         b = update(b, [ids[j] for j in known], z[known], cov_z[known])

@@ -1,4 +1,4 @@
-"""EKF-SLAM for a planar vehicle, and two controls that tell what its inconsistency comes from.
+"""EKF-SLAM for a planar vehicle, and two controls that show where its inconsistency comes from.
 
 ::
 
@@ -203,7 +203,15 @@ class EkfSlam(SlamFilter):
 
 
 class Truth(NamedTuple):
-    """True poses T_world_vehicle (T + 1, 3) and landmarks by identity (n, 2), for the ideal EKF only."""
+    """What is true, for the ideal EKF only.
+
+    Attributes
+    ----------
+    T_world_vehicle : ndarray, shape (T + 1, 3)
+        Poses (x, y, theta), metres and radians.
+    landmarks : ndarray, shape (n, 2)
+        World frame, metres; row i belongs to identity i.
+    """
 
     T_world_vehicle: Array
     landmarks: Array
@@ -214,10 +222,12 @@ class IdealEkf(EkfSlam):
 
     Parameters
     ----------
-    mean, cov, capacity
+    mean, cov : array_like
         As for :class:`EkfSlam`.
     truth : Truth
         Pose at the start and after every prediction, and the landmarks.
+    capacity : int
+        As for :class:`EkfSlam`.
     """
 
     def __init__(self, mean: ArrayLike, cov: ArrayLike, truth: Truth, capacity: int = 32) -> None:
@@ -263,7 +273,7 @@ class AnchoredEkf(EkfSlam):
 
     Parameters
     ----------
-    mean, cov, capacity
+    mean, cov, capacity : array_like, array_like, int
         As for :class:`EkfSlam`.
 
     Notes

@@ -1,4 +1,7 @@
-"""What goes into every filter of this room and what comes out of it."""
+"""What goes into every filter of this room and what comes out of it.
+
+Positions are in metres, headings in radians; covariances in the squares and products of these.
+"""
 
 from __future__ import annotations
 

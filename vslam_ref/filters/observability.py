@@ -1,4 +1,4 @@
-r"""What the linearised system of a run can tell apart: local observability and its nullity.
+r"""What the linearised system of a run can distinguish: local observability and its nullity.
 
 A run is a list of predictions with Jacobians F_k and measurements with Jacobians H_k.  An error d of
 the start shows in the k-th measurement as H_k F_{k-1} ... F_0 d; stacked::
@@ -8,7 +8,7 @@ the start shows in the k-th measurement as H_k F_{k-1} ... F_0 d; stacked::
         [ H_2 F_1 F_0     ]
         [ ...             ]
 
-Landmarks relative to the vehicle cannot tell where the world's origin lies nor how it is turned: the
+Landmarks relative to the vehicle do not show where the world's origin lies nor how it is turned: the
 true system has nullity 3.  A filter believes what *its* Jacobians say:
 
 ===========================  =======  ===============================================================
@@ -49,7 +49,7 @@ from vslam_ref.filters.ekf_slam import EkfSlam
 class Step(NamedTuple):
     """One step of one run: an increment (batch of 1), then a sighting (m may be 0).
 
-    ``ids`` (m,) in 0 ... n - 1, ``z`` (1, m, 2) and ``cov_z`` as in :meth:`EkfSlam.update`.
+    ``ids`` (m,) in 0 ... n - 1, ``z`` (1, m, 2) and ``cov_z`` (m, 2, 2) as in :meth:`EkfSlam.update`.
     """
 
     increment: vehicle.Increment
@@ -59,14 +59,34 @@ class Step(NamedTuple):
 
 
 class LinearisedRun(NamedTuple):
-    """Jacobians of a run: per step F (D, D), and H (rows, D) of the sighting after it (rows may be 0)."""
+    """Jacobians of a run.
+
+    Attributes
+    ----------
+    transitions : tuple of ndarray, shapes (D, D)
+        F of every step.
+    measurements : tuple of ndarray, shapes (rows, D)
+        H of the sighting after it; rows may be 0.
+    """
 
     transitions: tuple[Array, ...]
     measurements: tuple[Array, ...]
 
 
 class Nullity(NamedTuple):
-    """Dimension of the null space, an orthonormal basis (D, nullity), singular values, and the threshold."""
+    """Null space of an observability matrix.
+
+    Attributes
+    ----------
+    nullity : int
+        Its dimension.
+    basis : ndarray, shape (D, nullity)
+        Orthonormal columns.
+    singular_values : ndarray, shape (D,)
+        Falling.
+    threshold : float
+        Smaller ones are counted as zero.
+    """
 
     nullity: int
     basis: Array
@@ -152,7 +172,7 @@ def linearise_truth(
         True poses (x, y, theta), metres and radians.
     landmarks : array_like, shape (n, 2)
         World frame, metres.
-    sightings : sequence of array_like of int
+    sightings : sequence of array_like of int, shapes (m,)
         ``sightings[k]``: the landmarks seen from pose k + 1.
 
     Returns
@@ -211,7 +231,9 @@ def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "firs
 
 
 def lift_tangent(T_world_vehicle: ArrayLike, landmarks: ArrayLike) -> Array:
-    """Derivative of the lift in pose and landmarks: B14 and B15.
+    """Derivative of the lift in pose and landmarks.
+
+    Implements the derivatives of :eq:`eq-b14` (B14) and :eq:`eq-b15` (B15).
 
     Its columns span the tangent space of the manifold on which lifted states of real vehicles lie.
 

@@ -12,6 +12,8 @@ then moves a pose by an increment::
 
 Filters see increments only, so they work with any drive.  In :func:`front_wheel_step` the speed is
 that of the steered front wheel: the model of Bailey's simulator, the other common convention.
+
+Speeds are in m/s, steering angles and headings in radians, turn rates in rad/s, distances in metres.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def from_matrix(R: ArrayLike) -> Array:
         K[..., i + 1, i + 1] = 1.0 + d[..., i] - d[..., j] - d[..., k]
         K[..., j + 1, k + 1] = K[..., k + 1, j + 1] = R[..., j, k] + R[..., k, j]
         K[..., 0, i + 1] = K[..., i + 1, 0] = R[..., k, j] - R[..., j, k]
-    largest = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)
+    largest = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)  # eq-log-rotation
     row = np.take_along_axis(K, largest[..., None, None], -2)[..., 0, :]
     return canonical(row / np.linalg.norm(row, axis=-1, keepdims=True))
 
@@ -128,7 +128,7 @@ def log(q: ArrayLike) -> Array:
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     zero = n == 0.0  # also where the squares underflow: then sin = tan = angle
     factor = np.where(zero, 2.0 / np.where(w > 0.0, w, 1.0), 2.0 * np.arctan2(n, w) / np.where(zero, 1.0, n))
-    return np.asarray(factor * v)
+    return np.asarray(factor * v)  # eq-log-rotation
 
 
 def interpolate(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:

@@ -22,7 +22,7 @@ Conventions: ``pose`` is (x, y, theta) of the laser in the world, metres and rad
 ``[0, 0]`` lies at ``origin_xy``.  Times are seconds.
 
 This room does not import :mod:`vslam_ref.worlds`, nor the other way round:
-:meth:`StaticDynamicMap.update` takes anything with the fields of :class:`Scan`.
+:meth:`StaticDynamicMap.update` takes every object with the fields of :class:`Scan`.
 """
 
 from vslam_ref.grids.inverse_sensor import InverseSensor

@@ -115,7 +115,7 @@ def find_clusters(dynamic: LogOddsGrid, join: float = 0.3, least_cells: int = 1)
 
 @dataclass
 class Track:
-    """One thing over time: places (n, 2), sizes (n, 2) and cells at the times at which it was seen."""
+    """One thing over time: places (n, 2), sizes (n, 2) and cells when it was seen; velocity (2,), m/s."""
 
     id: int
     times: list[float] = field(default_factory=list)

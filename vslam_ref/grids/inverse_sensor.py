@@ -34,7 +34,13 @@ WHERES: tuple[Where, ...] = ("free", "unknown")
 
 
 class Steps(NamedTuple):
-    """Log-odds that an observation adds: (3, 3), S_{t-1} free, unknown or occupied x (miss, hit, graze)."""
+    """What an observation adds to a cell, in log-odds.
+
+    Attributes
+    ----------
+    static, dynamic : ndarray, shape (3, 3)
+        Row: S_{t-1} free, unknown or occupied; column: miss, hit, graze.
+    """
 
     static: Array
     dynamic: Array
@@ -42,7 +48,7 @@ class Steps(NamedTuple):
 
 @dataclass(frozen=True)
 class InverseSensor:
-    """Probabilities of the table; every field says why it has its value.
+    """Probabilities of the table, dimensionless; every field says why it has its value.
 
     Raises
     ------

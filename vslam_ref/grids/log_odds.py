@@ -84,7 +84,7 @@ def entropy_bits(log_odds: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class LogOddsGrid:
-    """One map: log-odds (rows, columns) on a lattice.
+    """One map: ``log_odds (rows, columns)`` on a lattice.
 
     Raises
     ------

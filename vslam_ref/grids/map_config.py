@@ -1,4 +1,4 @@
-"""Every number of S and D, with its reason; the rules behind them are told in :mod:`static_dynamic`."""
+"""Every number of S and D, with its reason; the rules behind them stand in :mod:`static_dynamic`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NoReturn = Literal["ignore", "free"]
 
 @dataclass(frozen=True)
 class MapConfig:
-    """How S and D are made; every field says why it has its value."""
+    """How S and D are made; metres, seconds, cells; every field says why it has its value."""
 
     resolution: float = assume(0.1, "m", "a leg is one or two cells")
     usable_range: float = assume(30.0, "m", "beams half a degree apart are then 0.26 m apart")

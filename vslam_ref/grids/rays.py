@@ -7,7 +7,7 @@ the edge.
 How it stays exact.  Ends of beams are rounded to 1/4096 of a cell (24 micrometres at 0.1 m).  Beyond that
 all numbers are integers held in floating point.  Where a beam crosses the k-th line between columns, its
 height is n/d with integers n and d; the quotient is rounded, but its floor and ceiling are those of n/d as
-long as n < 2^53: a fraction that is no integer m misses it by at least 1/d, and half a unit in the last
+long as n < 2^53: a fraction that is not an integer m misses it by at least 1/d, and half a unit in the last
 place of m is less.  Hence beams of up to :data:`MAX_LENGTH` cells.
 
 How it is done.  Each beam is mirrored to run to the right and upwards, and walked along the axis on which it
@@ -55,11 +55,13 @@ class BeamsInCells(NamedTuple):
 
 
 class Walks(NamedTuple):
-    """Mirrored beams, for (B,): integers held in floats, but ``start`` and ``signs``.
+    """Mirrored beams: integers held in floats, but ``start`` and ``signs``.
 
-    ``columns`` are crossed; at column ``k`` the beam enters at the height ``(rise k + offset) / run`` cells
-    above its first row; ``last_row`` is the row in which it ends.  ``start`` (B, 2) is the first cell (x, y),
-    ``signs`` (B, 2) tell the mirrored axes, ``steep`` the beams whose columns are rows.
+    ``columns (B,)`` and ``last_row (B,)`` count cells; ``offset (B,)``, ``rise (B,)`` and ``run (B,)`` are in
+    squared quanta, so ratios of them are cells.  All columns are crossed; at column ``k`` the beam enters
+    ``(rise k + offset) / run`` cells above its first row; ``last_row`` is the row in which it ends.
+    ``start`` (B, 2) is the first cell (x, y), ``signs`` (B, 2) mark the mirrored axes, ``steep (B,)`` the
+    beams whose columns are rows.
     """
 
     columns: IntArray
@@ -100,7 +102,7 @@ def walks(start: ArrayLike, ends: ArrayLike) -> Walks:
     cells = np.where(signs < 0, -1 - first, first).astype(np.int64)
     return Walks(
         columns=columns.astype(np.int64),
-        offset=pv * du - pu * dv,
+        offset=pv * du - pu * dv,  # eq-beam-height: numerator at k = 0; rise and run are the rest
         rise=QUANTA * dv,
         run=run,
         last_row=np.maximum(np.ceil((pv + dv) / QUANTA) - 1.0, 0.0),
@@ -261,7 +263,7 @@ def end_cells(ends: Array) -> IntArray:
 
 
 class Look(NamedTuple):
-    """What a scan says of some rows and columns of a map: ``window`` holds UNSEEN, GRAZE, MISS or HIT."""
+    """What a scan says of some rows and columns of a map: ``window (r, c)`` of UNSEEN, GRAZE, MISS or HIT."""
 
     rows: slice
     columns: slice
@@ -273,7 +275,7 @@ def look(shape: tuple[int, int], beams: BeamsInCells, graze: int = 0) -> Look:
 
     Parameters
     ----------
-    shape, beams, graze
+    shape, beams, graze : tuple of two ints, BeamsInCells, int
         As for :func:`mark_beams`.
 
     Raises

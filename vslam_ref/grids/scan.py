@@ -9,7 +9,7 @@ not a number    NaN                               nothing
 not positive    zero, negative, -inf              nothing (closer than the scanner can measure, or broken)
 ==============  ================================  ====================================================
 
-Nothing is dropped in silence: :class:`BeamCounts` adds up.
+Nothing is dropped in silence: :class:`BeamCounts` adds up.  Ranges are in metres, angles in radians.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ScanLike(Protocol):
 
 
 class Scan(NamedTuple):
-    """One scan: ``angles`` and ``ranges`` (B,) in the laser's frame, ``max_range`` and ``time``."""
+    """One scan: ``angles (B,)``, ``ranges (B,)`` in the laser's frame; ``max_range``; ``time``, seconds."""
 
     angles: Array
     ranges: Array
@@ -131,7 +131,7 @@ class BeamCounts(NamedTuple):
 
 
 class Beams(NamedTuple):
-    """Beams that say something: ``angles``, ``lengths`` (n,), whether each ends in a hit; all counted."""
+    """Beams that say something: ``angles (n,)``, ``lengths (n,)``, ``hit (n,)``; and counts of every kind."""
 
     angles: Array
     lengths: Array

@@ -48,13 +48,13 @@ KIND = np.array([-1, 2, 0, 1])
 
 
 class Layers(NamedTuple):
-    """What is kept of every cell, row by row: five arrays of shape (rows * columns,).
+    """What is kept of every cell, row by row: n = rows * columns.
 
     Attributes
     ----------
-    static, dynamic : ndarray
+    static, dynamic : ndarray, shape (n,)
         Log-odds L(S) and L(D).
-    seen, last_hit, since : ndarray
+    seen, last_hit, since : ndarray, shape (n,)
         Times, s: of the last look, of the last hit of the present visit (-inf: none), and of its first hit,
         shifted by the time at which nobody looked.
     """

@@ -17,6 +17,8 @@ from vslam_ref.geometry import so2
 def align_rigid(points: ArrayLike, reference: ArrayLike) -> Array:
     """Pose ``T_reference_points`` (3,) that brings points (N, 2) closest to the reference (N, 2).
 
+    Implements the minimum of :eq:`eq-umeyama` in the plane, with s = 1.  Metres and radians.
+
     Raises
     ------
     ValueError

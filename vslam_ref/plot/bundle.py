@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
@@ -17,6 +18,14 @@ LOSS_LOOKS: dict[str, style.Look] = {
     "adaptive": style.Look("Tukey, σ found", style.VERMILION, "-"),
     "ptam": style.Look("Tukey, PTAM's constants", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
 }
+
+
+def _curve(
+    axes: Axes, x: Array, line: Array, look: style.Look, band: tuple[Array | None, Array | None]
+) -> None:
+    axes.plot(x, line, color=look.colour, ls=look.line, marker="o", ms=3.5, lw=2, label=look.name)
+    if band[0] is not None and band[1] is not None:
+        axes.fill_between(x, band[0], band[1], color=look.colour, alpha=0.13, lw=0)
 
 
 def robust_figure(
@@ -50,22 +59,8 @@ def robust_figure(
         figure, panels = style.new_figure(4.2, 3)
         for axes, values in zip(panels, (centre, point, None), strict=True):
             for k, method in enumerate(methods):
-                look = LOSS_LOOKS[method]
-                line = 100 * broken[k] if values is None else values[1, k]
-                axes.plot(
-                    100 * shares,
-                    line,
-                    color=look.colour,
-                    ls=look.line,
-                    marker="o",
-                    ms=3.5,
-                    lw=2,
-                    label=look.name,
-                )
-                if values is not None:
-                    axes.fill_between(
-                        100 * shares, values[0, k], values[2, k], color=look.colour, alpha=0.13, lw=0
-                    )
+                low, line, high = (None, 100 * broken[k], None) if values is None else values[:, k]
+                _curve(axes, 100 * shares, line, LOSS_LOOKS[method], (low, high))
             axes.set_xlabel("wrong observations [%]")
             axes.axvline(50, color=style.GREY, lw=1, ls=(0, (2, 2)))
         for axes in panels[:2]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,6 +20,14 @@ _LINES = {
 _TITLES = {"first_order": "first-order moments of P0 and U", "gaussian": "exact Gaussian moments"}
 
 
+def _largest(gap: Mapping[str, Array], moments: str) -> Iterator[tuple[str, Array]]:
+    """The larger of both P0's gaps for every line that was measured."""
+    for key in _LINES:
+        names = [f"{key}/{moments}/{p0}" for p0 in ("low", "high")]
+        if found := [gap[name] for name in names if name in gap]:
+            yield key, np.maximum.reduce(found)
+
+
 def reduction_figure(time: Array, gap: Mapping[str, Array], *, bound: float) -> Figure:
     """Draw the largest absolute difference at each time, both P0 together.
 
@@ -35,16 +43,9 @@ def reduction_figure(time: Array, gap: Mapping[str, Array], *, bound: float) -> 
     with style.house_style():
         figure, panels = style.new_figure(4.9, 2, sharey=True)
         for axes, (moments, title) in zip(panels, _TITLES.items(), strict=True):
-            for key, (label, colour, line) in _LINES.items():
-                found = [
-                    gap[f"{key}/{moments}/{p0}"] for p0 in ("low", "high") if f"{key}/{moments}/{p0}" in gap
-                ]
-                if not found:
-                    continue
-                worst = np.maximum.reduce(found)
-                at = np.flatnonzero(
-                    worst > 0
-                )  # nothing to draw where two floats agree, or nothing was measured
+            for key, worst in _largest(gap, moments):
+                label, colour, line = _LINES[key]
+                at = np.flatnonzero(worst > 0)  # a logarithm draws nothing where two floats agree
                 axes.plot(time[at], worst[at], color=colour, ls=line, lw=1.6, label=label)
             axes.axhline(bound, color=style.BLACK, lw=1.2, ls=(0, (5, 2)))
             axes.set_yscale("log")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vslam_ref.arrays import Array
@@ -40,6 +41,14 @@ def losses_figure(losses: Mapping[str, Loss], end: float = 8.0) -> Figure:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(losses), frameon=False)
     return figure
+
+
+def _mark(axes: Axes, place: float, text: str) -> None:
+    axes.axvline(place, color=style.GREY, lw=1, ls=(0, (2, 2)))
+    axes.annotate(
+        text, (place, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -11),
+        textcoords="offset points", color=style.GREY, fontsize=9,
+    )  # fmt: skip
 
 
 def errata_figure(
@@ -85,12 +94,8 @@ def errata_figure(
                 starts, 100 * share, color=look.colour, ls=look.line, marker="o", ms=4, lw=2, label=look.name
             )
         for axes in (left, right):
-            for place, text in ((c / math.sqrt(3), "c/√3"), (c, "c")):
-                axes.axvline(place, color=style.GREY, lw=1, ls=(0, (2, 2)))
-                axes.annotate(
-                    text, (place, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -11),
-                    textcoords="offset points", color=style.GREY, fontsize=9,
-                )  # fmt: skip
+            _mark(axes, c / math.sqrt(3), "c/√3")
+            _mark(axes, c, "c")
         left.set(title="cost of one error", xlabel="norm of the error [σ]", ylabel="cost [σ², print: σ]")
         middle.set(
             title=f"sum over one scene, {wrong:.0%} wrong", xlabel="shift of the pose [σ]",

@@ -1,6 +1,6 @@
 """One look for all figures.
 
-Colours are those of Okabe and Ito, told apart with every kind of colour vision; line styles differ too,
+Colours are those of Okabe and Ito, distinguishable with every kind of colour vision; line styles differ too,
 so that a figure survives a black-and-white printer.  Nothing here touches matplotlib's global state.
 """
 

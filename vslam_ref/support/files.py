@@ -1,7 +1,7 @@
 """Files and folders that appear whole or not at all.
 
 Everything is written under a temporary name beside its destination and renamed.  The temporary name
-tells the process that owns it, so a later run can remove what a killed one left.
+names the process that owns it, so a later run can remove what a killed one left.
 """
 
 from __future__ import annotations

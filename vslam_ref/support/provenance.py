@@ -48,7 +48,7 @@ def _version(distribution: str) -> str | None:
 def git_state() -> tuple[str | None, bool | None]:
     """Return the commit this package's code comes from, and whether it was changed since.
 
-    Three cases are told apart: the code runs from a clone; it was installed from a repository's
+    Three cases are distinguished: the code runs from a clone; it was installed from a repository's
     address; it was installed from a clone whose files still are the same.  Otherwise
     ``(None, None)``: no commit is better than a wrong one.
     """

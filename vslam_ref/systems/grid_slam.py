@@ -8,7 +8,7 @@
 
 The scan is matched with the map *before* it is drawn into it.  The pose's error at that moment goes into
 the map and stays there; the covariance of the filter knows nothing of it.  What that costs is measured in
-chapter 20.
+chapter 20.  Poses are in metres and radians.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.association import NONE, Signature, associate, look_alike
 from vslam_ref.grids.landmarks.field import DistanceField, distance_field, sample
 from vslam_ref.grids.landmarks.landmark_map import Landmark, LandmarkConfig, LandmarkMap
-from vslam_ref.grids.landmarks.lines import CornerConfig, Corners, scan_corners
+from vslam_ref.grids.landmarks.lines import CornerConfig, ScanCorners, scan_corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig
 from vslam_ref.grids.landmarks.matching import Match, MatchConfig, match_scan, thin
 from vslam_ref.grids.landmarks.pose_update import pose_measurement, pose_update
@@ -58,7 +58,7 @@ class GridSlamConfig:
     field_reach: float = assume(0.5, "m", "more than where the search's loss ends")
 
 
-class Step(NamedTuple):
+class ScanStep(NamedTuple):
     """What one scan did.
 
     Attributes
@@ -67,11 +67,11 @@ class Step(NamedTuple):
         Estimate after the scan.
     match : Match or None
         None without matching, and for the first scan.
-    corners : Corners
+    corners : ScanCorners
         Of the scan, laser frame.
     landmark : ndarray of int, shape (m,)
         Number of the landmark that each corner updated; -1 none, -2 ambiguous.
-    chosen : ndarray of int
+    chosen : ndarray of int, shape (k,)
         Numbers of new landmarks.
     withdrawn : list of Landmark
     """
@@ -79,7 +79,7 @@ class Step(NamedTuple):
     T_world_robot: Array
     cov: Array
     match: Match | None
-    corners: Corners
+    corners: ScanCorners
     landmark: IntArray
     chosen: IntArray
     withdrawn: list[Landmark]
@@ -154,7 +154,7 @@ class GridSlam:
         ids = np.array([m.id for m in self.landmarks.active], dtype=np.int64)
         return self.filter.blocks.columns(ids)
 
-    def step(self, increment: Increment | None, scan: ScanLike) -> Step:
+    def step(self, increment: Increment | None, scan: ScanLike) -> ScanStep:
         """Move by an increment (None for the first scan), then use a scan.
 
         Raises
@@ -180,7 +180,7 @@ class GridSlam:
         self.maps.update(self.T_world_robot, scan)
         self.scans += 1
         cov = self.filter.blocks.P_pp[0].copy()
-        return Step(self.T_world_robot, cov, match, corners, landmark, chosen, withdrawn)
+        return ScanStep(self.T_world_robot, cov, match, corners, landmark, chosen, withdrawn)
 
     def follow(self, way: Iterable[tuple[Increment | None, ScanLike]]) -> Array:
         """Go through a whole recording; return the poses ``T_world_robot`` (n, 3) after each scan.
@@ -207,7 +207,7 @@ class GridSlam:
             pose_update(b, *pose_measurement(found.T_world_laser, found.information, predicted, cov))
         return found
 
-    def _use(self, corners: Corners) -> IntArray:
+    def _use(self, corners: ScanCorners) -> IntArray:
         """Associate corners with active landmarks and update the filter; return each corner's landmark."""
         active, b = self.landmarks.active, self.filter.blocks
         landmark = np.full(len(corners), NONE)
@@ -235,7 +235,7 @@ class GridSlam:
         assert seen is not None, "every active landmark is in the filter"
         return -seen.innovation.reshape(-1, 2), diagonal_blocks(seen.S)[0]
 
-    def _choose(self, corners: Corners, landmark: IntArray) -> IntArray:
+    def _choose(self, corners: ScanCorners, landmark: IntArray) -> IntArray:
         """Let unclaimed corners become landmarks, and put these into the filter."""
         chosen = self.landmarks.choose(
             self.scans, self.T_world_robot, corners, landmark == NONE, self.places(), self.static()

@@ -1,4 +1,7 @@
-"""Scenes for bundle adjustment: cameras on an arc around a box, or along a wall; errors free of the gauge."""
+"""Scenes for bundle adjustment: cameras on an arc around a box, or along a wall; errors free of the gauge.
+
+Lengths are in metres, angles in radians, image positions in pixels.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ RADIUS, BOX = 6.0, 1.5
 
 
 class Bundle(NamedTuple):
-    """A true scene, and who sees what where without any error."""
+    """A true scene, and who sees what where, without errors: ``view (n,)``, ``point (n,)``, ``uv (n, 2)``."""
 
     truth: Scene
     view: IntArray
@@ -47,7 +50,7 @@ def arc(angles: Array) -> Array:
 
 
 def make_bundle(angles: Array, points: int, rng: np.random.Generator) -> Bundle:
-    """Draw points uniformly in the box; every view sees all of them."""
+    """Views at ``angles (V,)`` of the arc, all of which see all points; these are uniform in the box."""
     X = rng.uniform(-BOX, BOX, (points, 3))
     T, K = arc(angles), np.array([INTRINSICS])
     view, point = (i.ravel() for i in np.divmod(np.arange(len(T) * points), points))
@@ -134,7 +137,7 @@ def nearest_of_family(found: Scene, truth: Scene) -> tuple[Array, Array]:
 
 
 def moved_world(scene: Scene, step: Array) -> Scene:
-    """The scene after the world was moved by Exp of the first six numbers and made e^s times as large."""
+    """The scene after its world was moved by Exp(step[:6]) and scaled by exp(step[6]), ``step (7,)``."""
     motion, s = se3.exp(step[:6]), float(np.exp(step[6]))
     T = se3.compose(scene.T_cam_world, se3.inverse(motion))
     T = se3.from_rt(T[:, :3, :3], s * T[:, :3, 3])

@@ -3,6 +3,8 @@
 ::
 
     world, noise --> Drive (increments, sightings) --follow--> after every step: pose, covariance, innovation
+
+Positions are in metres, angles in radians, times in seconds.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ class Drive(NamedTuple):
     seen: Mapping[int, tuple[IntArray, Array, Array]]
 
 
-class Step(NamedTuple):
+class FilterStep(NamedTuple):
     """After a step: mean (B, 3) and cov (B, 3, 3) of the pose; the innovation of an update, or None."""
 
     mean: Array
@@ -61,10 +63,14 @@ def field_drive(world: VehicleField, noise: Noise, scale: float = 1.0) -> Drive:
     return Drive(vehicle.ackermann_increment(controls, c.cov_u * scale**2, c.wheelbase, c.dt), seen)
 
 
-def follow(slam: SlamFilter, drive: Drive, every: int = 1) -> Iterator[Step]:
+def follow(slam: SlamFilter, drive: Drive, every: int = 1) -> Iterator[FilterStep]:
     """Yield the start and every so many steps: predict, update where something is seen, read the pose.
 
     A filter that puts increments down until they are needed is asked for its pose no more often than that.
+
+    Yields
+    ------
+    FilterStep
     """
     ds, dalpha, cov = drive.increments
     for k in range(ds.shape[1] + 1):
@@ -72,4 +78,4 @@ def follow(slam: SlamFilter, drive: Drive, every: int = 1) -> Iterator[Step]:
             slam.predict(vehicle.Increment(ds[:, k - 1], dalpha[:, k - 1], cov[:, k - 1]))
         innovation = slam.update(*drive.seen[k]) if k in drive.seen else None
         if k % every == 0:
-            yield Step(*slam.pose(), innovation)
+            yield FilterStep(*slam.pose(), innovation)

@@ -90,7 +90,7 @@ class Eight(NamedTuple):
 
 
 def drive(config: EightConfig, landmarks: Array) -> Eight:
-    """Drive past landmarks (n, 2) by the filters' own motion model, :func:`.vehicle.propagate`."""
+    """Drive past landmarks (n, 2), metres, by the filters' own motion model, :func:`.vehicle.propagate`."""
     times = np.arange(0, config.seconds, config.dt)
     side = np.floor(times / config.side_seconds)
     omega = np.where(side % 2 == 0, config.turn_rate, -config.turn_rate)

@@ -12,6 +12,8 @@ r"""A vehicle on a square course among point landmarks, with exact truth (seed B
 
 What is random in one run: the start estimate, drawn from P0; the control noise; the measurement
 noise.  The true path and the landmarks are the same for all runs.
+
+Positions are in metres, angles in radians, speeds in m/s, times in seconds.
 """
 
 from __future__ import annotations
@@ -179,7 +181,7 @@ def make_field(config: VehicleFieldConfig, rng: np.random.Generator) -> VehicleF
 def seen_within(
     max_range: float, steps: Iterable[int], T_world_vehicle: Array, landmarks: Array
 ) -> tuple[Sighting, ...]:
-    """List which of the landmarks (n, 2) are seen when: within ``max_range`` metres, at the given steps."""
+    """List which landmarks (n, 2) lie within ``max_range`` of T_world_vehicle (T, 3), at the given steps."""
     sightings = []
     for step in steps:
         z = observation.vehicle_from_world(T_world_vehicle[step], landmarks)

@@ -23,7 +23,7 @@ KINDS = {
 
 
 class Made(NamedTuple):
-    """What a maker tells of its files.
+    """What a maker says of its files.
 
     Attributes
     ----------

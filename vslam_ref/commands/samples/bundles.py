@@ -90,7 +90,7 @@ def _problems(
 def _known(problem: BundleProblem, lens_unknowns: int) -> dict[str, Any]:
     """Counts, and the law of the adjusted cost: sigma^2 / 2 times chi-square with the redundancy."""
     views, points, seen = problem.sizes
-    redundancy = 2 * seen - (6 * views + 3 * points - 7 + lens_unknowns)  # 7: nothing tells the gauge
+    redundancy = 2 * seen - (6 * views + 3 * points - 7 + lens_unknowns)  # 7: the gauge is free
     return {
         "cameras": views,
         "points": points,

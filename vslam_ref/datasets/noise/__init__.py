@@ -1,6 +1,6 @@
 """Gains and noises of the data sets, as found by ``vslam-ref identify`` without any truth.
 
-One JSON file a set: ``values`` (the fields of :class:`~vslam_ref.systems.slam_log.Calibration`),
+One JSON file a set: ``values`` (the fields of :class:`~vslam_ref.systems.slam_log.RobotCalibration`),
 ``method``, ``evidence`` and the ``command`` that makes the file again.
 """
 
@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from vslam_ref.systems.slam_log.calibration import Calibration
+from vslam_ref.systems.slam_log.calibration import RobotCalibration
 
 
 def document(name: str) -> dict[str, Any]:
@@ -23,6 +23,6 @@ def document(name: str) -> dict[str, Any]:
     return content
 
 
-def calibration(name: str) -> Calibration:
+def calibration(name: str) -> RobotCalibration:
     """The identified values of the set ``name``."""
-    return Calibration.from_mapping(document(name)["values"])
+    return RobotCalibration.from_mapping(document(name)["values"])

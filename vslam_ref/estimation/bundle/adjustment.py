@@ -1,4 +1,8 @@
-"""What a descent asks of bundle adjustment: normal equations at a place, a step, and where it leads."""
+"""What a descent asks of bundle adjustment: normal equations at a place, a step, and where it leads.
+
+Residuals are in pixels, or in standard deviations where covariances are given; rotations of a step in
+radians, translations and points in the unit of the scene, usually metres.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,7 @@ DAMPED = (1e-6, 1e32)
 
 
 class Place(NamedTuple):
-    """A state with its residuals (sorted), their validity, and what they cost."""
+    """A state with its residuals ``r (n, 2)`` (sorted), their validity ``valid (n,)``, and what they cost."""
 
     state: State
     r: Array
@@ -43,7 +47,7 @@ class Change(NamedTuple):
 
 @dataclass
 class Here:
-    """The problem at a place; the normal equations are added up when they are first asked for."""
+    """The problem at a place; the normal equations are added up when they are first needed."""
 
     problem: BundleProblem
     table: Structure
@@ -154,7 +158,7 @@ def moved(problem: BundleProblem, state: State, step: Change) -> State | None:
     """State after a step: Exp(xi) T, and sums; None where its intrinsics make no camera."""
     T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
     intrinsics = state.intrinsics.copy()
-    # views that share a lens have equal steps of it: any of them tells
+    # views that share a lens have equal steps of it: any of them will do
     intrinsics[problem.lens_of_view] += step.view[:, 6:] @ problem.free.intrinsics.T
     if step.view.shape[1] > 6 and not possible(problem.model, intrinsics):
         return None
@@ -163,7 +167,7 @@ def moved(problem: BundleProblem, state: State, step: Change) -> State | None:
 
 
 def possible(model: type[Camera], intrinsics: Array) -> bool:
-    """Tell whether every set of intrinsics (L, p) makes a camera: focal lengths above 0, and so on.
+    """Whether every set of intrinsics (L, p) makes a camera: focal lengths above 0, and so on.
 
     Examples
     --------

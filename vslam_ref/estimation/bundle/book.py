@@ -172,7 +172,7 @@ def _solve(S: dict[tuple[Key, Key], Array], rhs: dict[Key, Array], keys: list[Ke
 
 
 def moved(problem: BundleProblem, scene: Scene, steps: dict[Key, Array]) -> Scene:
-    """Scene after the steps: T <- expm(hat(xi)) T, all else by addition."""
+    """Scene after the steps (6,) of views and (3,) of points: T <- expm(hat(xi)) T, all else by addition."""
     from scipy.linalg import expm
 
     T, X, lenses = scene.T_cam_world.copy(), scene.X_world.copy(), scene.intrinsics.copy()

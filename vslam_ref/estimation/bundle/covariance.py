@@ -80,7 +80,7 @@ def covariance(
     ----------
     result : BundleResult
         At a minimum.
-    views, points : array_like of int
+    views, points : array_like of int, shapes (v,), (p,)
         Numbers of what is asked for.
     gauge : {"fixed", "free"}
         ``fixed``: what the problem holds is known.  ``free``: nothing may be held; see the module.
@@ -114,9 +114,9 @@ def covariance(
     dof = 2 * int(np.count_nonzero(result.weights)) - table.size - 3 * int(system.measured.sum())
     if sigma is None:
         sigma = math.sqrt(system.square / dof) if dof > 0 else math.inf
-    told = _open(system, chosen, dof, sigma)
-    if told:
-        return BundleCovariance(None, None, None, sigma, told)
+    reason = _open(system, chosen, dof, sigma)
+    if reason:
+        return BundleCovariance(None, None, None, sigma, reason)
     rows = chosen.of(system.solve(*chosen.units(table)), table)
     matrix = sigma**2 * (_projected(rows, chosen, system) if gauge == "free" else (rows + rows.T) / 2)
     k = 6 * len(chosen.views)

@@ -1,7 +1,7 @@
 """What is wrong with a problem, before anything is solved.
 
-None of this stops the solver; but a point that was seen once has no depth, and whoever believes its number
-should be told.
+None of this stops the solver; but a point that was seen once has no depth, and a user of its
+coordinates should know.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from vslam_ref.estimation.bundle.projection import reprojection
 
 
 class Diagnosis(NamedTuple):
-    """Numbers of the views, points and observations that something is wrong with.
+    """Numbers (indices, no unit) of the views, points and observations that something is wrong with.
 
     Attributes
     ----------
-    unseen_points : ndarray
+    unseen_points : ndarray of int, shape (a,)
         Points without an observation: they stay where they are.
-    once_seen_points : ndarray
-        Points with one observation: their depth is not measured, and they tell nothing about the view.
-    empty_views : ndarray
+    once_seen_points : ndarray of int, shape (b,)
+        Points with one observation: their depth is not measured, and they do not constrain the view.
+    empty_views : ndarray of int, shape (c,)
         Views without an observation: they stay where they are.
-    weak_views : ndarray
+    weak_views : ndarray of int, shape (d,)
         Free views with fewer than three points, which leave the pose open.
-    behind : ndarray
+    behind : ndarray of int, shape (e,)
         Observations whose point is behind its camera, or has no image for another reason.
     parts : int
         Number of groups of views that no point ties together; more than one means as many free gauges.
@@ -50,14 +50,14 @@ class Diagnosis(NamedTuple):
         >>> Diagnosis(none, np.array([3, 8]), none, none, none, 1).sentences()
         ['points seen once, whose depth is not measured: 2 (first: 3)']
         """
-        told = (
+        rows = (
             ("points without an observation, which stay", self.unseen_points),
             ("points seen once, whose depth is not measured", self.once_seen_points),
             ("views without an observation, which stay", self.empty_views),
             ("views that see fewer than three points, which leaves their pose open", self.weak_views),
             ("observations of a point behind the camera", self.behind),
         )
-        found = [f"{words}: {len(which)} (first: {which[0]})" for words, which in told if len(which)]
+        found = [f"{words}: {len(which)} (first: {which[0]})" for words, which in rows if len(which)]
         if self.parts > 1:
             found.append(f"the views fall into {self.parts} groups that no point ties together")
         return found

@@ -28,9 +28,10 @@ class Local(NamedTuple):
     ----------
     problem : BundleProblem
         Views: the active ones, then the ring.  Lenses are all kept, and do not move.
-    active, ring : ndarray of int
-        Numbers in the whole problem.
-    points, observations : ndarray of int
+    active, ring : ndarray of int, shapes (a,), (r,)
+        Numbers (indices, no unit) of views in the whole problem.
+    points, observations : ndarray of int, shapes (N,), (n,)
+        Numbers of points and observations in the whole problem.
     """
 
     problem: BundleProblem
@@ -75,8 +76,8 @@ def local_problem(problem: BundleProblem, active: ArrayLike) -> Local:
     ----------
     problem : BundleProblem
         The whole; what is fixed there stays fixed.
-    active : array_like of int
-        Views that move.
+    active : array_like of int, shape (a,)
+        Numbers (indices, no unit) of the views that move.
 
     Returns
     -------

@@ -5,6 +5,9 @@ With weighted rows r, J_view, J_point of each observation, summed over the obser
     B  = sum J_view^T J_view     g_view  = sum J_view^T r       per view   (V, d, d), (V, d)
     C  = sum J_point^T J_point   g_point = sum J_point^T r      per point  (N, 3, 3), (N, 3)
     W  = J_view^T J_point                                       per observation (n, d, 3)
+
+Rows are in pixels, or in standard deviations where covariances are given; so every block has the unit of
+a squared row over those of the coordinates: radians, and the unit of the scene.
 """
 
 from __future__ import annotations
@@ -28,7 +31,14 @@ from vslam_ref.geometry.cameras import Camera, Radtan
 
 
 class Normal(NamedTuple):
-    """Blocks of the normal equations; see the module."""
+    """Blocks of the normal equations; see the module.
+
+    Attributes
+    ----------
+    B, g_view : ndarray, shapes (V, d, d), (V, d)
+    C, g_point : ndarray, shapes (N, 3, 3), (N, 3)
+    W : ndarray, shape (n, d, 3)
+    """
 
     B: Array
     g_view: Array
@@ -97,7 +107,7 @@ def polynomial_normal(
         What rows are multiplied by: whitening times the root of the weight.
     basis : ndarray, shape (9, q)
         Free directions of the intrinsics.
-    offsets, view_order, view_offsets : ndarray of int
+    offsets, view_order, view_offsets : ndarray of int, shapes (N + 1,), (n,), (V + 1,)
         As in :class:`~vslam_ref.estimation.bundle.structure.Structure`.
     """
     links = Links(view, point, lens, uv)
@@ -135,7 +145,7 @@ def _weighted(at: Linearised, U: Array) -> tuple[Array, Array, Array]:
 
 
 def sum_by_point(rows: Array, offsets: IntArray) -> Array:
-    """Sum rows (n, m) of each point, (N, m): a product with a matrix of zeros and ones."""
+    """Sum rows (n, m) of any unit for each point, (N, m): a product with a matrix of zeros and ones."""
     from scipy.sparse import csr_array
 
     n, points = len(rows), len(offsets) - 1

@@ -1,4 +1,7 @@
-"""Wrong observations, found by their errors, and taken out."""
+"""Wrong observations, found by their errors, and taken out.
+
+Errors are in pixels, or in standard deviations where covariances are given.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ class Cleaned(NamedTuple):
 
 
 def wrong(problem: BundleProblem, sigma: float, limit: float = RAYLEIGH_99) -> BoolArray:
-    """Tell which observations are wrong: longer than ``limit`` times the scale, or without an image.
+    """Which observations are wrong: longer than ``limit`` times the scale, or without an image.
 
     Parameters
     ----------

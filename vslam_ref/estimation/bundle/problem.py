@@ -63,7 +63,7 @@ class Observations:
     Raises
     ------
     ValueError
-        On shapes that do not fit, numbers that are not finite, a covariance that is none.
+        On shapes that do not fit, numbers that are not finite, a covariance that is not positive definite.
     """
 
     view: IntArray
@@ -158,8 +158,8 @@ class BundleProblem:
         views, points, _ = self.sizes
         sets, parameters = self.scene.intrinsics.shape
         if parameters != len(self.model.names()):
-            told = ", ".join(self.model.names())
-            raise ValueError(f"intrinsics have {parameters} columns: {self.model.__name__} needs {told}")
+            needs = ", ".join(self.model.names())
+            raise ValueError(f"intrinsics have {parameters} columns: {self.model.__name__} needs {needs}")
         for number, values in enumerate(self.scene.intrinsics):
             try:
                 self.model.from_params(values)
@@ -195,8 +195,8 @@ class BundleProblem:
         bad = np.flatnonzero((index < 0) | (index >= count))
         if len(bad):
             k = int(bad[0])
-            told = f"there are {count} (numbers 0 to {count - 1})" if count else "there are none"
-            raise ValueError(f"observation {k} names {name} {index[k]}: {told}")
+            have = f"there are {count} (numbers 0 to {count - 1})" if count else "there are none"
+            raise ValueError(f"observation {k} names {name} {index[k]}: {have}")
 
     def _require_once(self) -> None:
         key = self.seen.view * max(1, self.sizes[1]) + self.seen.point
@@ -204,8 +204,8 @@ class BundleProblem:
         again = np.flatnonzero(np.diff(key[order]) == 0)
         if len(again):
             first, second = int(order[again[0]]), int(order[again[0] + 1])
-            told = f"view {self.seen.view[second]} sees point {self.seen.point[second]} twice"
-            raise ValueError(f"{told} (observations {first} and {second}): keep one, or merge them")
+            twice = f"view {self.seen.view[second]} sees point {self.seen.point[second]} twice"
+            raise ValueError(f"{twice} (observations {first} and {second}): keep one, or merge them")
 
     def _checked(self, free: Freedom) -> Freedom:
         views, points, _ = self.sizes

@@ -2,6 +2,7 @@ r"""Solving for the views: dense, or by a band where views only meet their neigh
 
 The band is that of all columns before the border, S = [[A, F], [F^T, G]] with A banded and F, G those of
 shared lenses.  With Y = A^-1 F, what is left for the border is G - F^T Y: a Schur complement once more.
+A factor has the square root of the unit of S.
 """
 
 from __future__ import annotations

@@ -18,6 +18,9 @@ The lower row gives the points, once the views are known; put into the upper row
 
 C is block diagonal, so :math:`C^{-1} = M M^T` with M of 3 x 3 blocks, and S = B - V V^T with V = W M.  This
 is symmetric by construction, and half the work.
+
+Residuals are in pixels, or in standard deviations where covariances are given; every block and step has the
+unit that follows, with angles in radians and lengths in the unit of the scene.
 """
 
 from __future__ import annotations
@@ -58,7 +61,7 @@ def diagonals(normal: Normal, table: Structure) -> Diagonals:
 
 
 def add_at_columns(columns: IntArray, values: Array, size: int) -> Array:
-    """Add up values (V, d) that belong to the same column of the reduced system, (size,)."""
+    """Add up values (V, d) of the same column of the reduced system, (size,), by ``columns (V, d)``."""
     total: Array = np.bincount(columns.ravel(), values.ravel(), minlength=size + 1)[:size].astype(np.float64)
     return total
 
@@ -92,7 +95,7 @@ def point_factor(C: Array, extra: Array, free: BoolArray) -> Array:
         d22 = c22 - l20 * l20 - l21 * l21
         l22 = np.sqrt(d22)
         good = free & (c00 > 0) & (d11 > 8 * EPS * c11) & (d22 > 8 * EPS * c22)
-        M = np.zeros(C.shape)
+        M = np.zeros(C.shape)  # eq-half: C^-1 = M M^T
         M[:, 0, 0], M[:, 1, 1], M[:, 2, 2] = 1 / l00, 1 / l11, 1 / l22
         M[:, 0, 1] = -l10 * M[:, 0, 0] * M[:, 1, 1]
         M[:, 1, 2] = -l21 * M[:, 1, 1] * M[:, 2, 2]
@@ -189,6 +192,8 @@ def point_steps(
     """Steps of the points (N, 3), from those of the views (V, d): -C^-1 (g_point + W^T step).
 
     Implements :eq:`eq-back-substitution`.
+    ``W (n, d, 3)``, ``M (N, 3, 3)``, ``g_point (N, 3)``, ``view_steps (V, d)``, ``view (n,)``,
+    ``offsets (N + 1,)``.
     """
     pulled = np.matmul(view_steps[view][:, None, :], W)[:, 0]
     total = sum_by_point(pulled, offsets) + g_point

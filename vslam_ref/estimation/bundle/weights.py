@@ -4,7 +4,7 @@ The error of an observation is :math:`\lVert e \rVert_\Sigma = (e^T \Sigma^{-1} 
 standard deviations, or in pixels where no covariance was given.  The objective is the sum of
 :math:`\rho(\lVert e \rVert_\Sigma)`.
 
-*Scale.*  A loss needs to know how large honest errors are.  Either it is told, or it looks: the adaptive
+*Scale.*  A loss needs to know how large honest errors are.  It is given, or it is estimated: the adaptive
 scale is taken from the median error anew after every accepted step, as PTAM does.  It changes the objective
 as it goes; a step is always judged at one scale.
 """
@@ -36,15 +36,15 @@ class Robust:
     least_scale : float
         The adaptive scale is never less.  PTAM's is 0.4 pixels.
 
-    Notes
-    -----
-    The adaptive scale is that of the *residuals*.  Those of a fit with p parameters to m coordinates are
-    smaller than the errors by about (1 - p/m)^(1/2): with each point seen four times, by a fifth or more.
-
     Raises
     ------
     ValueError
         On a scale that is not positive.
+
+    Notes
+    -----
+    The adaptive scale is that of the *residuals*.  Those of a fit with p parameters to m coordinates are
+    smaller than the errors by about (1 - p/m)^(1/2): with each point seen four times, by a fifth or more.
     """
 
     loss: Loss = field(default_factory=L2)
@@ -54,8 +54,8 @@ class Robust:
     def __post_init__(self) -> None:
         numbers = [self.least_scale] + ([] if self.scale == "adaptive" else [self.scale])
         if not all(isinstance(s, float | int) and s > 0 for s in numbers):
-            told = "need a number > 0, or 'adaptive' for the scale"
-            raise ValueError(f"scale={self.scale!r}, least_scale={self.least_scale!r}: {told}")
+            what = "need a number > 0, or 'adaptive' for the scale"
+            raise ValueError(f"scale={self.scale!r}, least_scale={self.least_scale!r}: {what}")
 
     def sigma(self, errors: Array, valid: BoolArray) -> float:
         """Scale for whitened errors (n, 2), of which the valid ones count."""
@@ -71,7 +71,7 @@ def whitener(cov_uv: Array) -> Array:
 
 
 def whitened(cov_uv: Array | None, r: Array) -> Array:
-    """Residuals (n, 2) in standard deviations; as they are without covariances.
+    """Residuals ``r (n, 2)`` in standard deviations of ``cov_uv (n, 2, 2)``; as they are without covariances.
 
     Examples
     --------
@@ -82,7 +82,15 @@ def whitened(cov_uv: Array | None, r: Array) -> Array:
 
 
 class Weighted(NamedTuple):
-    """What errors cost at one scale: cost and weight of each observation (n,), and the scale."""
+    """What errors cost at one scale.
+
+    Attributes
+    ----------
+    costs, weights : ndarray, shape (n,)
+        Of each observation; no unit.
+    sigma : float
+        The scale, in the unit of the errors.
+    """
 
     costs: Array
     weights: Array
@@ -97,8 +105,8 @@ class Weighted(NamedTuple):
 def weigh(robust: Robust, sigma: float, errors: Array, valid: BoolArray) -> Weighted:
     """Cost and weight of whitened errors (n, 2).
 
-    An observation without an image (not ``valid``) costs what an infinite error costs: a constant for a loss
-    that gives up, infinity for one that does not.
+    An observation without an image (``valid (n,)`` is False) costs what an infinite error costs: a constant
+    for a loss that gives up, infinity for one that does not.
     """
     loss = robust.loss.scaled(sigma) if math.isfinite(sigma) else L2()
     if isinstance(loss, L2):

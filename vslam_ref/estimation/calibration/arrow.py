@@ -9,6 +9,7 @@ for the intrinsics, and a border between them::
     [ B_1' B_2' ...  C  ]  [ camera  ]       [ g_c ]
 
 Eliminating the poses leaves a system as large as the camera has parameters, whatever the number of views.
+Residuals are in pixels; a pose step in the board's unit and radians, intrinsics in their own units.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from vslam_ref.arrays import Array, IntArray
 
 
-class Blocks(NamedTuple):
+class ArrowVector(NamedTuple):
     """A vector over all unknowns: poses (V, 6) and free intrinsics (m,)."""
 
     pose: Array
@@ -41,11 +42,11 @@ class Arrow(NamedTuple):
     g_pose: Array
     g_free: Array
 
-    def lengths(self) -> Blocks:
+    def lengths(self) -> ArrowVector:
         """Lengths of the columns of the Jacobian; 1 for a column of zeros."""
         pose = np.sqrt(np.einsum("vii->vi", self.A))
         free = np.sqrt(np.diag(self.C))
-        return Blocks(np.where(pose > 0, pose, 1.0), np.where(free > 0, free, 1.0))
+        return ArrowVector(np.where(pose > 0, pose, 1.0), np.where(free > 0, free, 1.0))
 
 
 def arrow(J_pose: Array, J_free: Array, residual: Array, weights: Array, first: IntArray) -> Arrow:
@@ -80,7 +81,7 @@ def arrow(J_pose: Array, J_free: Array, residual: Array, weights: Array, first: 
     )
 
 
-class Reduced(NamedTuple):
+class ReducedArrow(NamedTuple):
     """Intrinsics alone: S (m, m), gradient (m,), and A^-1 [B g] (V, 6, m + 1) to find the poses again."""
 
     S: Array
@@ -88,7 +89,7 @@ class Reduced(NamedTuple):
     solved: Array
 
 
-def reduce(normal: Arrow) -> Reduced | None:
+def reduce(normal: Arrow) -> ReducedArrow | None:
     """Eliminate the poses; None where a pose is not determined by its own corners.
 
     Implements :eq:`eq-calibration-reduced`.
@@ -103,10 +104,10 @@ def reduce(normal: Arrow) -> Reduced | None:
     m = normal.C.shape[0]
     product = np.einsum("vij,vik->jk", half[..., :m], half)
     S = normal.C - product[:, :m]
-    return Reduced(0.5 * (S + S.T), normal.g_free - product[:, m], solved)
+    return ReducedArrow(0.5 * (S + S.T), normal.g_free - product[:, m], solved)
 
 
-def damped_step(normal: Arrow, damping: float, scale: Blocks) -> Blocks | None:
+def damped_step(normal: Arrow, damping: float, scale: ArrowVector) -> ArrowVector | None:
     """Levenberg-Marquardt's step, (J^T J + damping D^2) step = -g, by elimination of the poses.
 
     Parameters
@@ -114,12 +115,12 @@ def damped_step(normal: Arrow, damping: float, scale: Blocks) -> Blocks | None:
     normal : Arrow
     damping : float
         At least 0.
-    scale : Blocks
+    scale : ArrowVector
         Diagonal of D.
 
     Returns
     -------
-    Blocks or None
+    ArrowVector or None
         None where the system is singular to working precision.
 
     Notes
@@ -135,17 +136,17 @@ def damped_step(normal: Arrow, damping: float, scale: Blocks) -> Blocks | None:
     if reduced is None:
         return None
     try:
-        L = np.linalg.cholesky(reduced.S)
+        L = np.linalg.cholesky(reduced.S)  # eq-damped
     except np.linalg.LinAlgError:
         return None
     free = -np.linalg.solve(L.T, np.linalg.solve(L, reduced.gradient))
     pose = -(reduced.solved[..., :-1] @ free + reduced.solved[..., -1])
-    step = Blocks(pose / d, free / e)
+    step = ArrowVector(pose / d, free / e)
     return step if np.isfinite(step.norm) else None
 
 
-def promised(normal: Arrow, step: Blocks, damping: float, scale: Blocks) -> float:
+def promised(normal: Arrow, step: ArrowVector, damping: float, scale: ArrowVector) -> float:
     """Decrease of the cost that the linear model promises for a damped step."""
     slope = float((normal.g_pose * step.pose).sum() + normal.g_free @ step.free)
     size = float(((scale.pose * step.pose) ** 2).sum() + ((scale.free * step.free) ** 2).sum())
-    return 0.5 * (damping * size - slope)
+    return 0.5 * (damping * size - slope)  # eq-gain-ratio: its denominator

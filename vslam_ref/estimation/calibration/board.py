@@ -95,6 +95,7 @@ class Corners(NamedTuple):
     Attributes
     ----------
     X_board : ndarray, shape (M, 3)
+        In the unit of the squares' sides, usually metres.
     uv : ndarray, shape (M, 2)
         Pixels.
     view : ndarray of int, shape (M,)

@@ -8,7 +8,8 @@
     intrinsics         S theta' = -(g_c - sum B_v' A_v^-1 g_v)
     poses              xi_v = -A_v^-1 (g_v + B_v theta')
 
-A test asserts that the fast form takes the same steps.
+Residuals are in pixels; poses in the board's unit and radians.  A test asserts that the fast form takes the
+same steps.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class BookCalibration(NamedTuple):
 
 
 class Arrow(NamedTuple):
-    """Blocks of the normal equations: A_v, B_v and g_v of each view, C and g_c of the camera."""
+    """Blocks of the normal equations: A_v (6, 6), B_v (6, n), g_v (6,) of each view; C (n, n), g_c (n,)."""
 
     A: list[Array]
     B: list[Array]
@@ -41,18 +42,18 @@ class Arrow(NamedTuple):
 
 
 def residual(camera: Camera, T_v: Array, X: Array, z: Array) -> Array:
-    """Predicted less measured pixels of one view's corners, (2 N,)."""
+    """Predicted less measured pixels of one view's corners, (2 N,): pose T_v (4, 4), X (N, 3), z (N, 2)."""
     return np.asarray(camera.pixel_from_world(T_v, X).uv - z).ravel()  # eq-calibration-residual
 
 
 def cost(camera: Camera, T: Array, views: list[tuple[Array, Array]]) -> float:
-    """Half the sum of all squared residuals."""
+    """Half the sum of all squared residuals, px^2; poses T (V, 4, 4), views of X (N, 3) and z (N, 2) each."""
     squares = [np.sum(residual(camera, T[v], X, z) ** 2) for v, (X, z) in enumerate(views)]
     return 0.5 * float(np.sum(squares))  # eq-calibration-cost
 
 
 def normal_equations(camera: Camera, T: Array, views: list[tuple[Array, Array]]) -> Arrow:
-    """Add up the blocks, view by view."""
+    """Add up the blocks, view by view; poses T (V, 4, 4), views of X (N, 3) and z (N, 2) each."""
     n = len(camera.params)
     A, B, g = list[Array](), list[Array](), list[Array]()
     C, g_c = np.zeros((n, n)), np.zeros(n)
@@ -76,16 +77,16 @@ def reduced(N: Arrow) -> tuple[Array, Array]:
 def damped_step(N: Arrow, lam: float) -> tuple[Array, list[Array], float]:
     """Step of the intrinsics, of each pose, and the decrease that they promise."""
     damped = N._replace(A=[A + lam * np.diag(np.diag(A)) for A in N.A], C=N.C + lam * np.diag(np.diag(N.C)))
-    theta = np.asarray(np.linalg.solve(*reduced(damped)))
+    theta = np.asarray(np.linalg.solve(*reduced(damped)))  # eq-damped
     xi = [np.asarray(-np.linalg.solve(A, g + B @ theta)) for A, B, g in zip(damped.A, N.B, N.g, strict=True)]
     square = sum(x @ np.diag(np.diag(A)) @ x for x, A in zip(xi, N.A, strict=True))
     square += theta @ np.diag(np.diag(N.C)) @ theta
     slope = sum(x @ g for x, g in zip(xi, N.g, strict=True)) + theta @ N.g_c
-    return theta, xi, 0.5 * float(lam * square - slope)
+    return theta, xi, 0.5 * float(lam * square - slope)  # eq-gain-ratio: its denominator
 
 
 def moved(T_v: Array, xi: Array) -> Array:
-    """Exp(xi) T_v."""
+    """Exp(xi) T_v of a step xi (6,) and a pose T_v (4, 4)."""
     from scipy.linalg import expm
 
     x, y, z, a, b, c = xi

@@ -59,7 +59,7 @@ def homography(X_plane: ArrayLike, x_image: ArrayLike) -> Array:
 
 
 def apply_homography(H: ArrayLike, X_plane: ArrayLike) -> Array:
-    """Images (..., N, 2) of points of the plane.
+    """Images (..., N, 2) of points ``X_plane (..., N, 2)`` of the plane by ``H (..., 3, 3)``.
 
     Implements :eq:`eq-board-homography`.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.calibration.arrow import Arrow, Blocks, arrow, damped_step, promised
+from vslam_ref.estimation.calibration.arrow import Arrow, ArrowVector, arrow, damped_step, promised
 from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.least_squares import Step
@@ -19,14 +19,31 @@ from vslam_ref.geometry.cameras import Lens, projection
 
 
 class State(NamedTuple):
-    """What is estimated: intrinsics (n,), and the board's pose in each view, T_cam_board (V, 4, 4)."""
+    """What is estimated.
+
+    Attributes
+    ----------
+    params : ndarray, shape (n,)
+        Intrinsics: focal lengths and centre in pixels, distortion dimensionless.
+    T_cam_board : ndarray, shape (V, 4, 4)
+        The board's pose in each view, translations in the board's unit.
+    """
 
     params: Array
     T_cam_board: Array
 
 
 class Residual(NamedTuple):
-    """Predicted minus measured pixels (M, 2), NaN where the camera does not see its corner; Jacobians."""
+    """Residuals of all corners, and their Jacobians.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (M, 2)
+        Predicted minus measured, pixels; NaN where the camera does not see its corner.
+    J_pose : ndarray, shape (M, 2, 6)
+        In the left perturbation of the pose of the corner's view.
+    J_intrinsics : ndarray, shape (M, 2, n)
+    """
 
     residual: Array
     J_pose: Array
@@ -38,7 +55,7 @@ class Residual(NamedTuple):
         return self.residual
 
 
-class Point(NamedTuple):
+class CalibrationIterate(NamedTuple):
     """Everything known at one state.
 
     Attributes
@@ -52,7 +69,7 @@ class Point(NamedTuple):
         Of the loss; ones without.
     normal : Arrow
         The normal equations.
-    scale : Blocks
+    scale : ArrowVector
         Metric D of a step: lengths of the Jacobian's columns.
     gradient_norm : float
         Largest cosine between a column of the Jacobian and the residual; 0 for no residual.
@@ -65,7 +82,7 @@ class Point(NamedTuple):
     costs: Array
     weights: Array
     normal: Arrow
-    scale: Blocks
+    scale: ArrowVector
     gradient_norm: float
     stiffness: float = 1.0
 
@@ -134,7 +151,7 @@ class Problem:
         length = np.linalg.norm(r, axis=1)
         return np.where(np.isfinite(length), self.loss.cost(length), np.inf)
 
-    def linearise(self, state: State, before: Point | None = None) -> Point | None:
+    def linearise(self, state: State, before: CalibrationIterate | None = None) -> CalibrationIterate | None:
         """Costs and normal equations, or None where the state is no camera that sees all corners."""
         if not self._is_camera(state):
             return None
@@ -150,23 +167,23 @@ class Problem:
         scale, size = normal.lengths(), float(np.sqrt(weights @ length**2))
         slopes = (normal.g_pose / scale.pose, normal.g_free / scale.free)
         slope = max(float(np.abs(g).max(initial=0.0)) for g in slopes) / size if size > 0 else 0.0
-        return Point(state, r, self.loss.cost(length), weights, normal, scale, slope)
+        return CalibrationIterate(state, r, self.loss.cost(length), weights, normal, scale, slope)
 
-    def step(self, here: Point, damping: float) -> Step | None:
+    def step(self, here: CalibrationIterate, damping: float) -> Step | None:
         """Damped step of poses and intrinsics, by elimination of the poses."""
         change = damped_step(here.normal, damping, here.scale)
         if change is None:
             return None
-        length = Blocks(here.scale.pose * change.pose, here.scale.free * change.free).norm
+        length = ArrowVector(here.scale.pose * change.pose, here.scale.free * change.free).norm
         promise = promised(here.normal, change, damping, here.scale)
         return Step(change, length, promise, length / here.scale.norm)
 
-    def move(self, here: Point, step: Step) -> State | None:
+    def move(self, here: CalibrationIterate, step: Step) -> State | None:
         """State after a step; None where its intrinsics make no camera."""
         there = self.plus(here.state, step.change)
         return there if self._is_camera(there) else None
 
-    def plus(self, state: State, change: Blocks) -> State:
+    def plus(self, state: State, change: ArrowVector) -> State:
         """Step: T <- Exp(xi) T for each pose, and a sum for the intrinsics."""
         T = se3.perturb(state.T_cam_board, change.pose)
         return State(state.params + self.free.basis @ change.free, T)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.estimation.calibration.arrow import Blocks, damped_step
-from vslam_ref.estimation.calibration.problem import Point, Problem, State
+from vslam_ref.estimation.calibration.arrow import ArrowVector, damped_step
+from vslam_ref.estimation.calibration.problem import CalibrationIterate, Problem, State
 
 SHARE = 0.1
 """Of the step that is taken."""
@@ -18,7 +18,7 @@ PRIOR = 1.0
 """What is added to the diagonal of J^T J."""
 
 
-def ptam_step(problem: Problem, here: Point, size: tuple[int, int]) -> State:
+def ptam_step(problem: Problem, here: CalibrationIterate, size: tuple[int, int]) -> State:
     """State after one step.
 
     Implements :eq:`eq-ptam-step`.
@@ -27,7 +27,7 @@ def ptam_step(problem: Problem, here: Point, size: tuple[int, int]) -> State:
     ----------
     problem : Problem
         PTAM's own has the FOV lens; any other works too.
-    here : Point
+    here : CalibrationIterate
         The problem at the state before.
     size : (int, int)
         Width and height of the images, pixels.
@@ -45,7 +45,7 @@ def ptam_step(problem: Problem, here: Point, size: tuple[int, int]) -> State:
     width, height = size
     unit = {"fx": 1 / width, "fy": 1 / height, "cx": 1 / width, "cy": 1 / height}
     scale = np.array([unit.get(name, 1.0) for name in problem.free.names])
-    step = damped_step(here.normal, PRIOR, Blocks(np.ones_like(here.normal.g_pose), scale))
+    step = damped_step(here.normal, PRIOR, ArrowVector(np.ones_like(here.normal.g_pose), scale))
     if step is None:
         raise ValueError("the normal equations are singular")
-    return problem.plus(here.state, Blocks(SHARE * step.pose, SHARE * step.free))  # eq-ptam-step
+    return problem.plus(here.state, ArrowVector(SHARE * step.pose, SHARE * step.free))  # eq-ptam-step

@@ -11,7 +11,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import reduce
 from vslam_ref.estimation.calibration.board import Corners
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import Point
+from vslam_ref.estimation.calibration.problem import CalibrationIterate
 from vslam_ref.estimation.calibration.start import Start
 from vslam_ref.estimation.least_squares import Iteration
 from vslam_ref.estimation.least_squares.result import CONVERGED, Reason
@@ -84,7 +84,7 @@ class Calibration:
 
     @property
     def rms_px(self) -> float:
-        """Root of the mean *squared distance*, as OpenCV and PTAM tell it."""
+        """Root of the mean *squared distance*, as OpenCV and PTAM report it."""
         return float(np.sqrt((self.errors_px**2).mean()))
 
     @property
@@ -121,21 +121,31 @@ def tilt(T_cam_board: Array) -> Array:
 
 
 class Certainty(NamedTuple):
-    """Noise, covariance of all intrinsics, and what is not determined."""
+    """Noise, covariance of all intrinsics, and what is not determined.
+
+    Attributes
+    ----------
+    sigma_px : float
+        Standard deviation of a coordinate of a corner, pixels.
+    covariance : ndarray, shape (n, n), or None
+        Of the intrinsics, each in its unit; None where they are not determined.
+    undetermined : str
+        What the corners do not determine; empty where they determine all.
+    """
 
     sigma_px: float
     covariance: Array | None
     undetermined: str
 
 
-def certainty(point: Point, free: Free) -> Certainty:
+def certainty(point: CalibrationIterate, free: Free) -> Certainty:
     """Covariance of the intrinsics, the poses unknown, from the reduced system.
 
     Implements :eq:`eq-calibration-covariance`.
 
     Parameters
     ----------
-    point : Point
+    point : CalibrationIterate
         The solution.
     free : Free
         Its free parameters.
@@ -172,23 +182,23 @@ def certainty(point: Point, free: Free) -> Certainty:
     return Certainty(sigma, cov, _vague(point, cov))
 
 
-def _vague(point: Point, cov: Array) -> str:
+def _vague(point: CalibrationIterate, cov: Array) -> str:
     """Focal length or principal point with a large standard deviation."""
     deviation, focal = np.sqrt(np.diag(cov))[:4], point.state.params[:2]
     share = deviation / np.tile(focal, 2)
     lost = [i for i in range(4) if share[i] > LARGEST_SHARE]
     if not lost:
         return ""
-    told = ", ".join(
+    groups = ", ".join(
         f"{name} = {point.state.params[i]:.6g} +- {deviation[i]:.3g}"
         for i, name in enumerate(("fx", "fy", "cx", "cy"))
         if i in lost
     )
-    return f"{told}{_flat(point)}"
+    return f"{groups}{_flat(point)}"
 
 
-def _flat(point: Point) -> str:
-    """Why the sensor is not determined, where the boards' directions tell."""
+def _flat(point: CalibrationIterate) -> str:
+    """Why the sensor is not determined, where the boards' directions show it."""
     T = point.state.T_cam_board
     largest = float(tilt(T).max())
     if largest > FLAT_TILT:

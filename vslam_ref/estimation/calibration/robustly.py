@@ -40,10 +40,17 @@ def calibrate_robustly(
 
     Parameters
     ----------
-    views, size, model, fixed, aspect
-        As for :func:`.solver.calibrate`.
+    views : sequence of (X_board, uv)
+        As for :func:`.solver.calibrate`: corners (N, 3) or (N, 2) in the board's unit, and where they were
+        found (N, 2), pixels.
+    size : (int, int)
+        Width and height of the images, pixels.
+    model : str
+        The camera's model, as for :func:`.solver.calibrate`.
     loss : str
         A name of :data:`~vslam_ref.estimation.robust.losses.LOSSES`, tuned to 95 % for plane errors.
+    fixed, aspect : mapping, float, optional
+        As for :func:`.solver.calibrate`.
 
     Returns
     -------

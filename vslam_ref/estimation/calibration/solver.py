@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.estimation.calibration.board import Corners, stack
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import Point, Problem
+from vslam_ref.estimation.calibration.problem import CalibrationIterate, Problem
 from vslam_ref.estimation.calibration.result import Calibration, certainty
 from vslam_ref.estimation.calibration.start import Start, find_start, state_of
 from vslam_ref.estimation.least_squares import Descent, Options, descend
@@ -102,7 +102,7 @@ def calibrate(
     return _result(corners, free, start, end)
 
 
-def _result(corners: Corners, free: Free, start: Start, end: Descent[Point]) -> Calibration:
+def _result(corners: Corners, free: Free, start: Start, end: Descent[CalibrationIterate]) -> Calibration:
     sure = certainty(end.here, free)
     return Calibration(
         camera=free.model.from_params(end.here.state.params),

@@ -97,7 +97,7 @@ def poses_for(corners: Corners, params: Array, model: type[Camera]) -> Start | N
     ----------
     corners : Corners
     params : ndarray, shape (n,)
-        Intrinsics.
+        Intrinsics; focal lengths and centre in pixels.
     model : type
         The camera's model.
     """

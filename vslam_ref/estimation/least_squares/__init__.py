@@ -28,7 +28,7 @@ from vslam_ref.estimation.least_squares.descend import Descent, descend
 from vslam_ref.estimation.least_squares.linear import Covariance, covariance, damped_step
 from vslam_ref.estimation.least_squares.options import Options
 from vslam_ref.estimation.least_squares.problem import Problem, numeric_jacobian
-from vslam_ref.estimation.least_squares.questions import Linearised, Questions, Step
+from vslam_ref.estimation.least_squares.questions import LinearModel, Questions, Step
 from vslam_ref.estimation.least_squares.result import Iteration, Reason, Solution
 from vslam_ref.estimation.least_squares.solver import minimise
 
@@ -38,7 +38,7 @@ __all__ = [
     "Damping",
     "Descent",
     "Iteration",
-    "Linearised",
+    "LinearModel",
     "Nielsen",
     "Options",
     "Problem",

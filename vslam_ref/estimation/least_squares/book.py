@@ -24,7 +24,7 @@ from vslam_ref.estimation.robust import L2, Loss
 
 
 class BookFit(NamedTuple):
-    """Where it ended, and the cost at the start and after every step that was tried."""
+    """Where it ended, x (n,), and the cost at the start and after every step that was tried."""
 
     x: Array
     costs: list[float]

@@ -17,6 +17,9 @@ Undamped     0                                     columns                   non
 
 A column that vanishes at some x, as that of a rate does where its exponential has died away, takes its
 damping with it, and the next step along it is huge.  Moré's scale remembers how long the column was.
+
+Gain, growth, tau and, where D comes from the columns, lambda and the radius are dimensionless; D has the
+unit of a column of J.
 """
 
 from __future__ import annotations

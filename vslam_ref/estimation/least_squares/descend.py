@@ -155,8 +155,8 @@ def _polish(problem: Questions[Place, Here], here: Here, total: float) -> _Trial
     share = 0.0 if step is None else step.promised / total
     if share > FLAT:
         why = "a wrong Jacobian, or the edge of a lens's invertible field?"
-        told = f"the model promises {share:.3g} of the cost, but no step brings it: {why}"
-        return _Trial(end=("stalled", told))
+        message = f"the model promises {share:.3g} of the cost, but no step brings it: {why}"
+        return _Trial(end=("stalled", message))
     return _Trial(end=("cost", f"a whole step promises {share:.3g} of the cost, which is rounding"))
 
 

@@ -144,8 +144,8 @@ def covariance(jacobian: ArrayLike, residual: ArrayLike, sigma: float | None = N
     if sigma is None:
         sigma = float(np.linalg.norm(r)) / math.sqrt(m - n) if m > n else math.inf
     if rank < n:
-        told = f"rank {rank} of {n}: a combination of the parameters is not measured"
-        return Covariance(None, sigma, rank, told)
+        reason = f"rank {rank} of {n}: a combination of the parameters is not measured"
+        return Covariance(None, sigma, rank, reason)
     if math.isinf(sigma):
         return Covariance(None, sigma, rank, f"{m} residuals for {n} parameters: the noise is unknown")
     root = np.linalg.solve(np.linalg.qr(J / scale, mode="r"), np.eye(n)) / scale[:, None]

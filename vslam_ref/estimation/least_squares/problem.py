@@ -1,7 +1,7 @@
 """What is minimised: residuals, their Jacobian (given or numeric), a robust loss, and a way to add a step.
 
 Values that are not finite are no error here: an exponential may overflow at a bold step, and the solver
-then takes a shorter one.
+then takes a shorter one.  Residuals may have any unit, and parameters each its own unit.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ Function = Callable[[Any], ArrayLike]
 Plus = Callable[[Array, Array], Array]
 
 
-class Point(NamedTuple):
+class Iterate(NamedTuple):
     """Everything known at one x.
 
     Attributes
     ----------
-    x : ndarray
+    x : ndarray, shape (k,)
     residual, costs, weights : ndarray, shapes (m,), (m / block,), (m,)
     jacobian : ndarray, shape (m, n)
     rows, target : ndarray, shapes (m, n), (m,)
@@ -38,7 +38,7 @@ class Point(NamedTuple):
     scale : ndarray, shape (n,)
         Diagonal of D.
     gradient_norm, stiffness : float
-        As in :class:`~vslam_ref.estimation.least_squares.questions.Linearised`.
+        As in :class:`~vslam_ref.estimation.least_squares.questions.LinearModel`.
     """
 
     x: Array
@@ -54,7 +54,7 @@ class Point(NamedTuple):
 
 
 def add(x: Array, step: Array) -> Array:
-    """Return x + step, the way to add in a vector space."""
+    """Return ``x (n,)`` + ``step (n,)``, the way to add in a vector space."""
     return x + step
 
 
@@ -107,7 +107,7 @@ class Problem:
         """Cost of each block, (m / block,), finite or not."""
         return self._costs(self.residual_at(x))
 
-    def linearise(self, x: Array, before: Point | None = None) -> Point | None:
+    def linearise(self, x: Array, before: Iterate | None = None) -> Iterate | None:
         """Residual, weights and Jacobian at x; None where one of them is not finite.
 
         Implements :eq:`eq-linearised` and :eq:`eq-reweighted`.
@@ -127,9 +127,9 @@ class Problem:
             gradient_norm(rows, target, lengths),
             float(np.max(lengths / scale, initial=0.0)) ** 2,
         )
-        return Point(x, residual, costs, weights, jacobian, rows, target, scale, slope, stiffness)
+        return Iterate(x, residual, costs, weights, jacobian, rows, target, scale, slope, stiffness)
 
-    def step(self, here: Point, damping: float) -> Step | None:
+    def step(self, here: Iterate, damping: float) -> Step | None:
         """Damped step and its promise, the denominator of :eq:`eq-gain-ratio`."""
         change = damped_step(here.rows, here.target, damping, here.scale)
         if change is None:
@@ -139,7 +139,7 @@ class Problem:
         promised = 0.5 * float(np.sum((here.rows @ change) ** 2)) + damping * length**2  # eq-gain-ratio
         return Step(change, length, promised, length / max(float(np.linalg.norm(size)), 1e-300))
 
-    def move(self, here: Point, step: Step) -> Array:
+    def move(self, here: Iterate, step: Step) -> Array:
         """Return x after a step."""
         return self.plus(here.x, step.change)
 
@@ -170,9 +170,9 @@ class Problem:
 
 
 def gradient_norm(rows: Array, target: Array, lengths: Array) -> float:
-    """Largest cosine between a column of the Jacobian and the residual; 0 where one of them is zero.
+    """Largest cosine between a column of ``rows (m, n)`` and ``target (m,)``; 0 where one of them is zero.
 
-    It has no unit, so one threshold serves pixels and metres.
+    ``lengths (n,)`` are those of the columns.  It has no unit, so one threshold serves pixels and metres.
     """
     length = float(np.linalg.norm(target))
     if length == 0.0 or rows.size == 0:
@@ -189,7 +189,7 @@ def numeric_jacobian(
     ----------
     function : callable
         Maps x to (m,).
-    x : ndarray
+    x : ndarray, shape (k,)
     plus : callable
         Complex steps are tried only for the plain sum.
     coordinates : int, optional
@@ -218,6 +218,7 @@ def numeric_jacobian(
     sizes = np.maximum(1.0, np.abs(x)) if plus is add else np.ones(n)
     steps = EPS ** (1 / 3) * np.eye(n) * sizes
     pairs = [(function(plus(x, h)), function(plus(x, -h)), h.sum()) for h in steps]
+    # eq-difference-quotient
     slopes = [(np.asarray(a, float) - np.asarray(b, float)) / (2.0 * h) for a, b, h in pairs]
     return np.stack(slopes, axis=1) if slopes else np.empty((len(np.asarray(function(x))), 0))
 

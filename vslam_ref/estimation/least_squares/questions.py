@@ -29,7 +29,7 @@ class Step(NamedTuple):
     share: float = math.inf
 
 
-class Linearised(Protocol):
+class LinearModel(Protocol):
     """A problem at one place; its numbers may be computed when they are first asked for."""
 
     @property
@@ -46,7 +46,7 @@ class Linearised(Protocol):
 
 
 Place = TypeVar("Place")
-Here = TypeVar("Here", bound=Linearised)
+Here = TypeVar("Here", bound=LinearModel)
 
 
 class Questions(Protocol[Place, Here]):

@@ -54,10 +54,10 @@ class Solution:
 
     Attributes
     ----------
-    x : ndarray
-        The best point found; the start where nothing better was.
+    x : ndarray, shape (k,)
+        The best point found, in its own units; the start where nothing better was.
     cost : float
-        Sum of rho(r), half the sum of squares without a loss.
+        Sum of rho(r), half the sum of squares without a loss; the square of the residuals' unit.
     residual : ndarray, shape (m,)
         At ``x``, not weighted.
     jacobian : ndarray, shape (m, n)

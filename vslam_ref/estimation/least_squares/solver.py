@@ -38,7 +38,7 @@ def minimise(
         Maps x to (m,), predicted minus measured.
     start : array_like
         Where to begin, finite.
-    with_jacobian, loss, block, plus, coordinates
+    with_jacobian, loss, block, plus, coordinates : optional
         As for :class:`~vslam_ref.estimation.least_squares.problem.Problem`.
     options : Options, optional
 
@@ -79,8 +79,8 @@ def minimise(
         return _nothing(x, r, 0.0, "no_residuals", "there are no residuals")
     here = problem.linearise(x)
     if here is None:
-        told = "residual, cost or Jacobian is not finite at the start"
-        return _nothing(x, r if np.isfinite(r).all() else r[:0], math.inf, "not_finite", told)
+        message = "residual, cost or Jacobian is not finite at the start"
+        return _nothing(x, r if np.isfinite(r).all() else r[:0], math.inf, "not_finite", message)
     end = descend(problem, here, options)
     return Solution(
         x=end.here.x,

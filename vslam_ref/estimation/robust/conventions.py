@@ -44,7 +44,7 @@ scales, cannot be compared.
 
 
 class SquaredForm(NamedTuple):
-    """A loss of s = x²: value, first and second derivative with respect to s, each (...)."""
+    """A loss of s = x²: ``rho (...)``, ``first (...)`` and ``second (...)`` derivative with respect to s."""
 
     rho: Array
     first: Array

@@ -31,7 +31,7 @@ MAD_NORM_2D = 0.8493218002880191
 class Scale(NamedTuple):
     """Estimated standard deviation of one coordinate, and why it is what it is.
 
-    ``sigma`` is never NaN.  It is ``inf`` where the sample says nothing (``reason`` tells), so that
+    ``sigma`` is never NaN.  It is ``inf`` where the sample does not determine it (see ``reason``), so that
     ``loss.scaled(sigma)`` is plain least squares; it is 0 where more than half of the errors are 0.
     """
 
@@ -158,8 +158,8 @@ def _scale(sizes: Array, factor: float, measured: int, fitted: int | None) -> Sc
     if fitted is not None:
         small = small_sample_factor(measured, fitted)
         if math.isinf(small):
-            told = f"{measured} measurements for {fitted} parameters"
-            return Scale(math.inf, f"{told}: no redundancy, the scale is unknown")
+            have = f"{measured} measurements for {fitted} parameters"
+            return Scale(math.inf, f"{have}: no redundancy, the scale is unknown")
         factor *= small
     sigma = factor * float(np.median(sizes))
     return Scale(sigma, "median" if sigma > 0.0 else "more than half of the errors are zero")

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 FALSE_ALARM = 0.01
 """Of a whole claim that rests on bands."""
 LEAST_FOR_BAND = 200
-"""Repetitions from which a band tells INFLATED variances of three numbers in most studies."""
+"""Repetitions from which a band detects INFLATED variances of three numbers in most studies."""
 INFLATED = 1.25
-"""Factor on all variances that a band's null rate is told for."""
+"""Factor on all variances for which a band's null rate is reported."""
 ZERO, SEEN = 1e-10, 1e-5
 """Relative singular values: at most the former counts as zero, at least the latter as none."""
 SAME_COST, SAME_PX = 1e-9, 1e-4

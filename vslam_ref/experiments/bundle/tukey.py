@@ -34,7 +34,7 @@ BROKEN = 3.0
 FEW, MANY = 0.05, 0.95
 """What works breaks in at most this share of scenes; what does not work, in at least that."""
 NULL_SHARE = 0.2
-"""Share of broken scenes that "works" must tell apart from; and 1 - this, for "does not work"."""
+"""Share of broken scenes that "works" must be distinguished from; and 1 - this, for "does not work"."""
 PRICE = 1.15
 """Mean square error of Tukey over that of least squares on honest data; large samples say 1/0.95."""
 APART = 1.1

@@ -96,7 +96,7 @@ class Experiment(Generic[C]):
     points : callable
         ``points(config) -> sequence``: densities, filters, ...; one point unless given.
     name : callable, optional
-        ``name(point) -> str``, where points are told apart by name and need not have equally many runs.
+        ``name(point) -> str``, where points are distinguished by name and need not have equally many runs.
     seeds : callable
         ``seeds(config, point) -> sequence`` of units: one ``SeedSequence`` per run, a tuple of them per
         batch, or None where nothing is drawn.

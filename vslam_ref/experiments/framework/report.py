@@ -1,6 +1,6 @@
 """``OUT/index.html``: every experiment in the folder, its figure, its claims, its assumptions.
 
-Verdicts are told by words and signs as well as by colour.  What was found stands as one sentence; the rule
+Verdicts are shown by words and signs as well as by colour.  What was found stands as one sentence; the rule
 and the raw values are folded under it.
 """
 
@@ -61,7 +61,7 @@ def read_result(folder: Path) -> dict[str, Any]:
 
 
 def _records(content: Any, key: str) -> bool:
-    """Tell whether ``content[key]`` is a list of JSON objects."""
+    """Whether ``content[key]`` is a list of JSON objects."""
     rows = content.get(key) if isinstance(content, dict) else None
     return isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
 

@@ -167,7 +167,7 @@ def dask_client(address: str, module: str = "vslam_ref") -> Iterator[Any]:
     distributed: Any = importlib.import_module("distributed")
     log = logging.getLogger("distributed")
     level = log.level
-    log.setLevel(logging.CRITICAL)  # a refused connection is told once, by the error below
+    log.setLevel(logging.CRITICAL)  # a refused connection is reported once, by the error below
     try:
         try:
             client = distributed.Client(address, timeout=DASK_TIMEOUT, set_as_default=False)

@@ -52,7 +52,7 @@ class Moment(NamedTuple):
 class Mapped(NamedTuple):
     """The end of a log.
 
-    ``dynamic_scans`` (rows, columns) tells in how many scans each cell was decided dynamic; ``last_dynamic``
+    ``dynamic_scans`` (rows, columns) counts in how many scans each cell was decided dynamic; ``last_dynamic``
     when it was last (NaN: never).  ``seconds`` is the time that S and D took, without reading and drawing.
     """
 
@@ -137,7 +137,7 @@ def map_log(
     see : callable, optional
         Is shown every moment.
     progress : callable, optional
-        Is told the number of scans so far.
+        Called with the number of scans so far.
     """
     grid, plain, tracker = StaticDynamicMap(config.map), PlainMap(config.map), Tracker(config.tracks)
     corners = bounds(log, config.map.usable_range, config.map.resolution, config.map.no_return)

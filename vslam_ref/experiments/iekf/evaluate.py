@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.iekf import worlds
-from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import Sentence
 from vslam_ref.experiments.iekf.worlds import Pick, Series
@@ -79,7 +79,7 @@ class _Null:
 
 
 def evaluate_all(
-    sentences: Sequence[Sentence], data: Series, control: Series, scene: Scene, rng: np.random.Generator
+    sentences: Sequence[Sentence], data: Series, control: Series, clock: StudyClock, rng: np.random.Generator
 ) -> list[Evaluation]:
     """Evaluate claims on the per-run arrays of a study.
 
@@ -90,7 +90,7 @@ def evaluate_all(
         The study's series by the names the rules use; rows are the same runs.
     control : mapping of str to ndarray, shape (C, T)
         The consistent control; may be empty if no rule needs it.
-    scene : Scene
+    clock : StudyClock
     rng : Generator
         Every purpose gets its own child, so a claim's numbers do not depend on which others are asked for.
 
@@ -103,13 +103,13 @@ def evaluate_all(
     rules = {s.id: s.rule for s in sentences}
     streams = dict(zip(("subsets", "bootstrap", "nested", "null"), rng.spawn(4), strict=True))
     whole = {name: x.mean(axis=0)[None] for name, x in data.items()}
-    own = {name: x[: scene.runs].mean(axis=0)[None] for name, x in data.items()}
-    drawn, naive = _both(rules, worlds.subsets(data, scene.runs, streams["subsets"]), scene)
-    resampled = _collect(rules, worlds.bootstraps(data, streams["bootstrap"]), worlds.as_is, scene)
+    own = {name: x[: clock.runs].mean(axis=0)[None] for name, x in data.items()}
+    drawn, naive = _both(rules, worlds.subsets(data, clock.runs, streams["subsets"]), clock)
+    resampled = _collect(rules, worlds.bootstraps(data, streams["bootstrap"]), worlds.as_is, clock)
     nested = _collect(
-        rules, worlds.resampled_subsets(data, scene.runs, streams["nested"]), worlds.as_is, scene
+        rules, worlds.resampled_subsets(data, clock.runs, streams["nested"]), worlds.as_is, clock
     )
-    nulls = _nulls(rules, data, control, scene, streams["null"])
+    nulls = _nulls(rules, data, control, clock, streams["null"])
     evaluations = []
     for s in sentences:
         threshold = _threshold(s.rule, nulls[s.id].calm)
@@ -119,16 +119,16 @@ def evaluate_all(
             Evaluation(
                 sentence=s,
                 threshold=threshold,
-                own=float(s.rule.measure.compute(worlds.as_is(s.rule, own), scene)[0]),
-                own_naive=bool(pointwise.holds(worlds.as_is(s.rule, own), scene)[0]) if pointwise else None,
-                population=float(s.rule.measure.compute(worlds.as_is(s.rule, whole), scene)[0]),
+                own=float(s.rule.measure.compute(worlds.as_is(s.rule, own), clock)[0]),
+                own_naive=bool(pointwise.holds(worlds.as_is(s.rule, own), clock)[0]) if pointwise else None,
+                population=float(s.rule.measure.compute(worlds.as_is(s.rule, whole), clock)[0]),
                 interval=consistency.percentile_interval(resampled[s.id], LEVEL),
                 subsets=drawn[s.id],
                 naive=naive[s.id],
                 share_interval=consistency.percentile_interval(shares, LEVEL),
                 null_rate=float(np.mean(s.rule.holds(nulls[s.id].false, threshold))),
                 population_runs=len(next(iter(data.values()))),
-                study_runs=scene.runs,
+                study_runs=clock.runs,
             )
         )
     return evaluations
@@ -143,18 +143,18 @@ def _threshold(rule: Rule, calm: Array | None) -> float:
 
 
 def _collect(
-    rules: Mapping[str, Rule], draws: Iterable[Series], pick: Pick, scene: Scene
+    rules: Mapping[str, Rule], draws: Iterable[Series], pick: Pick, clock: StudyClock
 ) -> dict[str, Array]:
     """Statistic of every rule over all draws of a pass."""
     parts: dict[str, list[Array]] = {i: [] for i in rules}
     for curves in draws:
         for i, rule in rules.items():
-            parts[i].append(rule.measure.compute(pick(rule, curves), scene))
+            parts[i].append(rule.measure.compute(pick(rule, curves), clock))
     return {i: np.concatenate(p) for i, p in parts.items()}
 
 
 def _both(
-    rules: Mapping[str, Rule], draws: Iterable[Series], scene: Scene
+    rules: Mapping[str, Rule], draws: Iterable[Series], clock: StudyClock
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_] | None]]:
     """Statistic and naive reading of every rule over all draws of the study."""
     values: dict[str, list[Array]] = {i: [] for i in rules}
@@ -162,39 +162,39 @@ def _both(
     for curves in draws:
         for i, rule in rules.items():
             picked = worlds.as_is(rule, curves)
-            values[i].append(rule.measure.compute(picked, scene))
+            values[i].append(rule.measure.compute(picked, clock))
             if rule.naive is not None:
-                truths[i].append(rule.naive.holds(picked, scene))
+                truths[i].append(rule.naive.holds(picked, clock))
     naive = {i: np.concatenate(truths[i]) if truths[i] else None for i in rules}
     return {i: np.concatenate(values[i]) for i in rules}, naive
 
 
 def _nulls(
-    rules: Mapping[str, Rule], data: Series, control: Series, scene: Scene, rng: np.random.Generator
+    rules: Mapping[str, Rule], data: Series, control: Series, clock: StudyClock, rng: np.random.Generator
 ) -> dict[str, _Null]:
     """Null worlds of all rules.  What sets a threshold and what rates it are drawn apart."""
     swap_a, swap_b, control_a, control_b, scale = rng.spawn(5)
-    size = scene.runs
+    size = clock.runs
     swap = {i: r for i, r in rules.items() if r.null == "swapped"}
     fixed = {i: r for i, r in rules.items() if r.null == "scaled"}
     rest = {i: r for i, r in rules.items() if r.null not in ("swapped", "scaled")}
     nulls: dict[str, _Null] = {}
     if swap:
         part = _only(data, swap)
-        calm = _collect(swap, worlds.swaps(part, size, swap_a), worlds.swapped, scene)
-        false = _collect(swap, worlds.swaps(part, size, swap_b), worlds.swapped, scene)
+        calm = _collect(swap, worlds.swaps(part, size, swap_a), worlds.swapped, clock)
+        false = _collect(swap, worlds.swaps(part, size, swap_b), worlds.swapped, clock)
         nulls |= {i: _Null(false[i], calm[i]) for i in swap}
     if fixed:
         whole = {name: x.mean(axis=0)[None] for name, x in data.items()}
         pass_ = worlds.subsets(_only(data, fixed), size, scale)
-        false = _collect(fixed, pass_, worlds.scaled(scene, whole), scene)
+        false = _collect(fixed, pass_, worlds.scaled(clock, whole), clock)
         nulls |= {i: _Null(false[i], None) for i in fixed}
     if rest:
         half = len(next(iter(control.values()))) // 2
         first = worlds.centred({name: x[:half] for name, x in control.items()})
         second = worlds.centred({name: x[half:] for name, x in control.items()})
-        calm = _collect(rest, worlds.subsets(first, size, control_a), worlds.consistent, scene)
-        false = _collect(rest, worlds.subsets(second, size, control_b), worlds.false_control(scene), scene)
+        calm = _collect(rest, worlds.subsets(first, size, control_a), worlds.consistent, clock)
+        false = _collect(rest, worlds.subsets(second, size, control_b), worlds.false_control(clock), clock)
         nulls |= {i: _Null(false[i], calm[i]) for i in rest}
     return nulls
 

@@ -29,7 +29,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, judged
 from vslam_ref.experiments.iekf.evaluate import Evaluation, evaluate_all
-from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
 from vslam_ref.experiments.iekf.worlds import control_names
@@ -99,8 +99,8 @@ def evaluate(study: StudyArrays, claim_ids: Sequence[str], rng: np.random.Genera
     calm = [s for s in sentences if s.rule.needs_control]
     controls = dict.fromkeys(name for s in calm for name in control_names(s.rule))
     data, control = _gather(study, names), _gather(study, controls)
-    scene = Scene(np.asarray(study["time"], dtype=np.float64), study["lap_seconds"], study["runs"])
-    return evaluate_all(sentences, data, control, scene, rng)
+    clock = StudyClock(np.asarray(study["time"], dtype=np.float64), study["lap_seconds"], study["runs"])
+    return evaluate_all(sentences, data, control, clock, rng)
 
 
 def conclude(e: Evaluation) -> Claim:

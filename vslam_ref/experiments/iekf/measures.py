@@ -39,7 +39,7 @@ def phrase(*names: WindowName) -> str:
 
 
 @dataclass(frozen=True)
-class Scene:
+class StudyClock:
     """The clock of a study, and what follows from the number of runs.
 
     Attributes
@@ -106,7 +106,7 @@ class Measure:
 
     says: str
     found: str
-    compute: Callable[[Curves, Scene], Array]
+    compute: Callable[[Curves, StudyClock], Array]
     window: WindowName | None = None
     percent: bool = False
 
@@ -177,7 +177,7 @@ def difference_factor(name: WindowName) -> Measure:
     """Factor between two series, whichever is larger."""
     w = phrase(name)
 
-    def compute(c: Curves, s: Scene) -> Array:
+    def compute(c: Curves, s: StudyClock) -> Array:
         r = s.average(c[0], name) / s.average(c[1], name)
         return np.maximum(r, 1.0 / r)
 
@@ -202,7 +202,7 @@ def growth_at_closure() -> Measure:
     )
 
 
-def _rise(curve: Array, s: Scene) -> Array:
+def _rise(curve: Array, s: StudyClock) -> Array:
     return s.average(curve, "end") - s.average(curve, "after closure")
 
 
@@ -226,7 +226,7 @@ def ratio_of_ratios(name: WindowName) -> Measure:
     """(first / second) / (third / fourth), time averages in a window."""
     w = phrase(name)
 
-    def compute(c: Curves, s: Scene) -> Array:
+    def compute(c: Curves, s: StudyClock) -> Array:
         a, b, p, q = (s.average(curve, name) for curve in c)
         return (a / b) / (p / q)
 
@@ -240,7 +240,7 @@ def least_ratio(name: WindowName) -> Measure:
     """Smaller of first/third and second/fourth."""
     w = phrase(name)
 
-    def compute(c: Curves, s: Scene) -> Array:
+    def compute(c: Curves, s: StudyClock) -> Array:
         a, b, p, q = (s.average(curve, name) for curve in c)
         return np.minimum(a / p, b / q)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.experiments.iekf.measures import Curves, Measure, Scene, WindowName, phrase
+from vslam_ref.experiments.iekf.measures import Curves, Measure, StudyClock, WindowName, phrase
 from vslam_ref.experiments.iekf.rules import BRIEF, Reading
 from vslam_ref.metrics import consistency
 
@@ -37,7 +37,7 @@ def hardly_above(*names: WindowName) -> Reading:
 def at_times_above(name: WindowName) -> Reading:
     """Above the line at some time, for at most a quarter of the window."""
 
-    def holds(c: Curves, s: Scene) -> NDArray[np.bool_]:
+    def holds(c: Curves, s: StudyClock) -> NDArray[np.bool_]:
         f = consistency.fraction_above(c[0], s.line, s.window(name))
         return np.asarray((f > 0.0) & (f <= BRIEF))
 

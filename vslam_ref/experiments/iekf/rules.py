@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.iekf.measures import Curves, Measure, Scene
+from vslam_ref.experiments.iekf.measures import Curves, Measure, StudyClock
 
 MARKED = 1.197
 """A growth is marked when it takes a consistent filter's expected NEES, 3, up to B's line, 3.592."""
@@ -43,7 +43,7 @@ class Reading:
     """A naive reading: what it is in words, and whether it holds for each draw."""
 
     says: str
-    holds: Callable[[Curves, Scene], NDArray[np.bool_]]
+    holds: Callable[[Curves, StudyClock], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from vslam_ref.experiments.framework import Claim, Study, Verdict
 from vslam_ref.experiments.iekf.figures import study_arrays
 from vslam_ref.experiments.iekf.grid import BASELINE, SensitivityConfig, Setting, settings_of
 from vslam_ref.experiments.iekf.judge import judge
-from vslam_ref.experiments.iekf.measures import Scene
+from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.sentences import SENTENCES, claim_ids
 from vslam_ref.experiments.iekf.study import StudyConfig, run_study
 
@@ -78,13 +78,13 @@ def simulate(config: SensitivityConfig, setting: Setting, unit: None) -> Verdict
     for figure in (2, 3, 4):
         rng = np.random.default_rng([setting.study.seed, figure])
         claims |= {c.id: c for c in judge(arrays, claim_ids(figure), rng)}
-    scene = Scene(study.time, setting.study.field.lap_seconds, setting.study.runs)
+    clock = StudyClock(study.time, setting.study.field.lap_seconds, setting.study.runs)
     rows = [claims[i] for i in SENTENCES]
     return Verdicts(
         np.array([c.verdict for c in rows]),
         np.array([np.nan if c.share is None else c.share for c in rows]),
         np.array([np.nan if c.null_rate is None else c.null_rate for c in rows]),
-        np.array([scene.average(study.nees[key], "end") for key in keys(setting.study)]),
+        np.array([clock.average(study.nees[key], "end") for key in keys(setting.study)]),
     )
 
 

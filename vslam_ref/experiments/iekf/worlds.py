@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.iekf.measures import DOF, Curves, Scene
+from vslam_ref.experiments.iekf.measures import DOF, Curves, StudyClock
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.metrics import consistency
 from vslam_ref.metrics.consistency.bootstrap import resampled_subset_weights
@@ -106,14 +106,14 @@ def consistent(rule: Rule, curves: Series) -> Curves:
     return tuple(curves[name] for name in control_names(rule))
 
 
-def false_control(scene: Scene) -> Pick:
+def false_control(clock: StudyClock) -> Pick:
     """Alter the control until a claim of consistency, or of no growth, is false."""
-    later = scene.time >= scene.lap_seconds * (1 - 1e-9)
+    later = clock.time >= clock.lap_seconds * (1 - 1e-9)
 
     def pick(rule: Rule, curves: Series) -> Curves:
         calm = consistent(rule, curves)
         if rule.null == "inflated":
-            return tuple(scene.inflation * c for c in calm)
+            return tuple(clock.inflation * c for c in calm)
         if rule.null == "grown" and rule.effect is not None:
             return tuple(np.where(later, rule.effect**2, 1.0) * c for c in calm)
         return calm
@@ -121,14 +121,14 @@ def false_control(scene: Scene) -> Pick:
     return pick
 
 
-def scaled(scene: Scene, population: Series) -> Pick:
+def scaled(clock: StudyClock, population: Series) -> Pick:
     """Scale the first series until the population's two averages differ by effect^2."""
 
     def pick(rule: Rule, curves: Series) -> Curves:
         first, second = as_is(rule, curves)
         if rule.measure.window is None or rule.effect is None:
             raise ValueError("the scaled world needs a window and an effect")
-        a, b = (scene.average(c, rule.measure.window)[0] for c in as_is(rule, population))
+        a, b = (clock.average(c, rule.measure.window)[0] for c in as_is(rule, population))
         return rule.effect**2 * (b / a) * first, second
 
     return pick

@@ -16,16 +16,16 @@ from vslam_ref.support.config import config_to_dict
 from vslam_ref.support.errors import InputError, suggestion
 from vslam_ref.systems.slam_log import (
     FILTERS,
-    Calibration,
     LogRun,
+    LogTruth,
+    RobotCalibration,
     RunSettings,
     SlamLog,
-    Truth,
     run_log,
     summary,
 )
 from vslam_ref.systems.slam_log.evaluate import errors_while_blind
-from vslam_ref.systems.slam_log.runner import Seen
+from vslam_ref.systems.slam_log.runner import SeenLandmarks
 from vslam_ref.systems.slam_log.timeline import build_timeline
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ DEFAULT_ROBOT = 1
 class LogConfig:
     """Everything a run of a log depends on."""
 
-    calibration: Calibration = field(default_factory=Calibration)
+    calibration: RobotCalibration = field(default_factory=RobotCalibration)
     run: RunSettings = field(default_factory=RunSettings)
 
 
@@ -51,7 +51,7 @@ class Source(NamedTuple):
     dataset: str
     robot: int | None
     log: SlamLog
-    truth: Truth | None
+    truth: LogTruth | None
 
 
 class Comparison(NamedTuple):
@@ -141,7 +141,7 @@ def as_run(batch: Batch, log: SlamLog, times: Array) -> LogRun:
     poses = poses_between(line, batch.poses)
     unknown = np.full((len(batch.ids), 2, 2), np.nan)
     ids = np.concatenate([s.ids for s in log.sightings])
-    seen = Seen(
+    seen = SeenLandmarks(
         times=np.repeat(batch.times, [len(s.ids) for s in log.sightings]),
         ids=ids,
         polar=np.concatenate([s.polar for s in log.sightings]),
@@ -175,7 +175,7 @@ def document(comparison: Comparison, asked: str) -> dict[str, Any]:
     }
 
 
-def _truth_note(truth: Truth | None) -> str | None:
+def _truth_note(truth: LogTruth | None) -> str | None:
     if truth is None:
         return None
     return "motion capture" if truth.exact else "GPS, jumps excluded"

@@ -25,7 +25,7 @@ from vslam_ref.plot.saving import save_figure
 from vslam_ref.plot.slam_log import Drawn, error_figure, map_figure
 from vslam_ref.support import files, pages
 from vslam_ref.support.json_text import to_json
-from vslam_ref.systems.slam_log import KEYS, LogRun, Truth, place
+from vslam_ref.systems.slam_log import KEYS, LogRun, LogTruth, place
 from vslam_ref.systems.slam_log.evaluate import reference_point
 
 TRAJECTORY = "time_s,x_m,y_m,theta_rad,sd_x_m,sd_y_m,sd_theta_rad"
@@ -72,17 +72,17 @@ def all_runs(comparison: Comparison) -> dict[str, LogRun]:
     return {**comparison.runs, **bound}
 
 
-def _exact(truth: Truth | None) -> bool:
+def _exact(truth: LogTruth | None) -> bool:
     return truth is not None and truth.exact
 
 
-def truth_path(truth: Truth) -> Array:
+def truth_path(truth: LogTruth) -> Array:
     """True positions (N, 2) with a row of NaN where the truth is interrupted."""
     gaps = np.flatnonzero(np.diff(truth.times) > truth.max_gap) + 1
     return np.insert(truth.T_world_vehicle[:, :2], gaps, np.nan, axis=0)
 
 
-def drawn_run(run: LogRun, truth: Truth | None) -> Drawn:
+def drawn_run(run: LogRun, truth: LogTruth | None) -> Drawn:
     """A run in the world frame: path and map aligned; errors unaligned where the truth is exact."""
     aligned = place(run, truth, aligned=True) if truth is not None else None
     T = aligned.T_world_run if aligned is not None else np.zeros(3)

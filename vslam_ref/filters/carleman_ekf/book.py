@@ -40,7 +40,7 @@ def start_lifted(pose: Array, P0: Array) -> Belief:
 
 
 def start_reduced(pose: Array, P0: Array) -> Belief:
-    """(x, y, sin, cos), the first four lifted states."""
+    """(x, y, sin, cos), the first four lifted states, of a ``pose (3,)`` with covariance ``P0 (3, 3)``."""
     lifted = start_lifted(pose, P0)
     return Belief(lifted.Z[:4], lifted.P[:4, :4])  # eq-b5
 
@@ -58,7 +58,7 @@ def columns(rows: object, size: int) -> Array:
 
 
 def vehicle_rows(z: Array, U: Array) -> Array:
-    """The eleven vehicle states after the control; linear in z (11,)."""
+    """The eleven vehicle states after the control U (3,); linear in z (11,)."""
     u1, u2, u3 = U
     z1, z2, z3, z4, z5, z6, z7, z8, z9, z10, z11 = z
     return np.array(
@@ -79,7 +79,7 @@ def vehicle_rows(z: Array, U: Array) -> Array:
 
 
 def vehicle_noise(z: Array, U: Array) -> Array:
-    """J_U (11, 3): the derivative of the eleven rows in U."""
+    """J_U (11, 3): the derivative of the eleven rows of z (11,) in U (3,)."""
     u1, u2, u3 = U
     _, _, z3, z4, z5, z6, z7, z8, z9, z10, z11 = z
     return np.array(
@@ -100,7 +100,7 @@ def vehicle_noise(z: Array, U: Array) -> Array:
 
 
 def predict_lifted(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
-    """Move by an increment: one Q_U for vehicle and landmarks, so the cross blocks have their share of it."""
+    """Move by an increment with noise Q (2, 2): one Q_U for vehicle, landmarks and the cross blocks."""
     U, Q_U = control(ds, dalpha, Q)
     turn = np.array([[U[2], U[1]], [-U[1], U[2]]])
     M_L = block_diag(np.eye(2), turn, turn)  # eq-b18
@@ -113,7 +113,7 @@ def predict_lifted(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
 
 
 def predict_reduced(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
-    """The same for x, y, sin, cos and the landmarks r_i in the vehicle's axes."""
+    """The same, noise Q (2, 2), for x, y, sin, cos and the landmarks r_i in the vehicle's axes."""
     (u1, u2, u3), Q_U = control(ds, dalpha, Q)
     A = np.array([[1, 0, 0, u1], [0, 1, u1, 0], [0, 0, u3, u2], [0, 0, -u2, u3]])  # eq-b9
     M = block_diag(A, *[np.array([[u3, u2], [-u2, u3]])] * len(b.ids))  # eq-reduced-filter
@@ -148,7 +148,7 @@ def update(b: Belief, ids: Sequence[int], z: Array, cov_z: Array, lifted: bool) 
 
 
 def augment(b: Belief, i: int, z: Array, cov_z: Array, lifted: bool) -> Belief:
-    """Add landmark i, seen for the first time at z (2,)."""
+    """Add landmark i, seen for the first time at z (2,) with cov_z (2, 2)."""
     G_3, G_new = np.zeros((2, len(b.Z))), np.eye(2)
     new = z  # eq-reduced-filter: r_new = z
     if lifted:
@@ -165,7 +165,7 @@ def augment(b: Belief, i: int, z: Array, cov_z: Array, lifted: bool) -> Belief:
 
 
 def see(b: Belief, ids: Sequence[int], z: Array, cov_z: Array, lifted: bool) -> Belief:
-    """Use a sighting: update with the landmarks that are known, then add the new ones."""
+    """Use a sighting, ``z (m, 2)`` with ``cov_z (m, 2, 2)``: update the known landmarks, then add the new."""
     known = [j for j, i in enumerate(ids) if i in b.ids]
     if known:
         b = update(b, [ids[j] for j in known], z[known], cov_z[known], lifted)

@@ -66,7 +66,7 @@ class Variant:
     Attributes
     ----------
     b18_as_printed : bool
-        Last row of B18 with ``+ z_i5 u2``.  It turns (sin y_i, cos y_i) by a matrix that is no rotation.
+        Last row of B18 with ``+ z_i5 u2``.  It turns (sin y_i, cos y_i) by a matrix that is not a rotation.
     b26_as_printed : bool
         Row 5 of B26 with ``- y_new z11``.
     cross_noise : bool

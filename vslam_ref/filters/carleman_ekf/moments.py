@@ -123,7 +123,8 @@ def lifted_start(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
 
     Returns
     -------
-    mean, cov : ndarray, shapes (B, 11), (B, 11, 11)
+    mean : ndarray, shape (B, 11)
+    cov : ndarray, shape (B, 11, 11)
     """
     if checked_moments("start", kind) == "gaussian":
         return _gaussian_moments(_LIFTED_VEHICLE, mean, cov)

@@ -31,7 +31,8 @@ def start_moments(mean: Array, cov: Array, kind: str) -> tuple[Array, Array]:
 
     Returns
     -------
-    mean, cov : ndarray, shapes (B, 4), (B, 4, 4)
+    mean : ndarray, shape (B, 4)
+    cov : ndarray, shape (B, 4, 4)
     """
     x, y, theta = mean.T
     s, c = np.sin(theta), np.cos(theta)
@@ -66,7 +67,8 @@ def control_first_order(increment: Increment) -> tuple[Array, Array]:
 
     Returns
     -------
-    mean, cov : ndarray, shapes (B, 5), (B, 5, 5)
+    mean : ndarray, shape (B, 5)
+    cov : ndarray, shape (B, 5, 5)
     """
     m = np.exp(-1j * increment.dalpha)
     t = increment.ds * m

@@ -4,11 +4,11 @@
 
     x_p (B, 4)        x, y, sin, cos
     x_m (B, M)        rho of every landmark: b numbers each, rho first
-    P_a (B, 8, 8)     covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) that waits
-    frame (B, 4)      complex: c and tau;  and what waits: D and e with p <- p + D h, h <- e h
+    P_a (B, 8, 8)     covariance of the pose states and of the noise (Re A, Im A, Re g, Im g) still pending
+    frame (B, 4)      complex: c and tau;  and what is pending: D and e with p <- p + D h, h <- e h
 
     reduced_predict   k controls at once: x_p, P_a and frame; no landmark is touched        O(k)
-    reduced_apply     what waits goes into the map: P_pm <- Phi P_pm + N_pg E, P_mm += E^T N_gg E
+    reduced_apply     what is pending goes into the map: P_pm <- Phi P_pm + N_pg E, P_mm += E^T N_gg E
     reduced_update    the same, then a measurement                                          O(m n^2)
 
 These work in place on a batch of B runs, as their names say.  The formulas are those at the head of
@@ -108,7 +108,7 @@ def reduced_predict_first_order_in_place(
 ) -> None:
     """:func:`reduced_predict_in_place` with first-order moments of increments.
 
-    ``ds``, ``dalpha`` (B, k) and ``cov`` (B, k, 2, 2) are those of k increments, one after the other.
+    ``ds (B, k)``, ``dalpha (B, k)``, ``cov (B, k, 2, 2)``: those of k increments, one after the other.
     """
     mean, noise = control_first_order(Increment(ds.ravel(), dalpha.ravel(), cov.reshape(-1, 2, 2)))
     _predict(x_p, P_a, frame, mean.reshape(*ds.shape, 5), noise.reshape(*ds.shape, 5, 5))
@@ -171,7 +171,7 @@ def reduced_update_in_place(
     ----------
     state : State
         Changed in place, but for ``P_pp``: the pose's covariance is the first block of ``P_a``.
-    b, P_a, frame
+    b, P_a, frame : int, ndarray, ndarray
         As for :func:`reduced_apply_in_place`; changed in place.
     columns : ndarray of int, shape (m,)
         First map column of each landmark seen.
@@ -184,8 +184,10 @@ def reduced_update_in_place(
 
     Returns
     -------
-    innovation, S : ndarray, shapes (B, 2 m), (B, 2 m, 2 m)
-        measured - predicted, and its covariance.
+    innovation : ndarray, shape (B, 2 m)
+        measured - predicted.
+    S : ndarray, shape (B, 2 m, 2 m)
+        Its covariance.
     """
     _apply(state, b, P_a, frame)
     seen = reduced_expected(state, frame, columns, z, cov_z)
@@ -194,7 +196,7 @@ def reduced_update_in_place(
 
 
 def reduced_expected(state: State, frame: Complex, columns: IntArray, z: Array, cov_z: Array) -> Expected:
-    """Innovation, S and H P of landmarks of the map, when no noise waits; nothing is changed.
+    """Innovation, S and H P of landmarks of the map, when no noise is pending; nothing is changed.
 
     Implements the reduced :eq:`eq-b22` (B22).  H is the real matrix of c at each landmark seen, and zero
     elsewhere.  Parameters as for :func:`reduced_update_in_place`.

@@ -7,7 +7,8 @@
     a camera            stack the rows of all points   the smallest singular vector is [R t]
     from three points   d_1, d_2, d_3 by two conics    then the motion of one triangle onto the other
 
-The fast forms do the same for many points, or problems, at once.  A test asserts that they agree.
+Points, centres and translations share any unit; bearings are unit vectors.  The fast
+forms do the same for many points, or problems, at once.  A test asserts that they agree.
 """
 
 from __future__ import annotations
@@ -18,35 +19,41 @@ from vslam_ref.arrays import Array
 
 
 def across(b: Array) -> Array:
-    """N_b (2, 3): two unit vectors across a bearing, the null space of its row."""
+    """N_b (2, 3): two unit vectors across a bearing b (3,), the null space of its row."""
     return np.asarray(np.linalg.svd(b[None])[2][1:])
 
 
 def hat(t: Array) -> Array:
-    """Matrix of t x: hat(t) a = t x a."""
+    """Matrix (3, 3) of t x, for t (3,): hat(t) a = t x a."""
     return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
 
 
 def essential(R_b_a: Array, t_b_a: Array) -> Array:
-    """E with b_b' E b_a = 0 for the bearings of one point in two cameras."""
+    """E (3, 3) of R_b_a (3, 3), t_b_a (3,), with b_b' E b_a = 0 for the bearings of one point."""
     return np.asarray(hat(t_b_a) @ R_b_a)  # eq-essential
 
 
 def midpoint(p_a: Array, b_a: Array, p_b: Array, b_b: Array) -> Array:
-    """Middle of the shortest segment between two rays: centres p, unit bearings b in the world's frame."""
+    """Middle (3,) of the shortest segment between two rays; world frame.
+
+    Centres ``p_a (3,)``, ``p_b (3,)``; unit bearings ``b_a (3,)``, ``b_b (3,)``.
+    """
     P_a, P_b = np.eye(3) - np.outer(b_a, b_a), np.eye(3) - np.outer(b_b, b_b)
     return np.asarray(np.linalg.solve(P_a + P_b, P_a @ p_a + P_b @ p_b))  # eq-midpoint
 
 
 def triangulate(R: list[Array], t: list[Array], b: list[Array]) -> Array:
-    """Point X_world (3,) seen along the bearings b (each in its camera's frame), by linear equations."""
+    """Point X_world (3,) by linear equations, from a list over views of R_cam_world, t_cam_world and bearing.
+
+    Each ``R (3, 3)``, ``t (3,)``; each bearing ``b (3,)`` in its camera's frame.
+    """
     rows = [across(b_i) @ np.column_stack([R_i, t_i]) for R_i, t_i, b_i in zip(R, t, b, strict=True)]
     X = np.linalg.svd(np.concatenate(rows))[2][-1]  # eq-triangulation-linear
     return np.asarray(X[:3] / X[3])
 
 
 def nearest_rotation(M: Array) -> Array:
-    """Rotation nearest to a matrix."""
+    """Rotation (3, 3) nearest to a matrix M (3, 3)."""
     U, _, Vt = np.linalg.svd(M)
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
 
@@ -95,14 +102,14 @@ def p3p(b: Array, X: Array) -> list[tuple[Array, Array]]:
 
 
 def meet(line: Array, A: Array) -> list[Array]:
-    """Real points x with line' x = 0 and x' A x = 0."""
+    """Real points x (3,) on line (3,) and conic A (3, 3): line' x = 0 and x' A x = 0."""
     p, q = across(line / np.linalg.norm(line))
     s = np.roots([p @ A @ p, 2 * p @ A @ q, q @ A @ q])
     return [s_k.real * p + q for s_k in s if abs(s_k.imag) <= 1e-9 * abs(s_k)]
 
 
 def triad(X: Array) -> Array:
-    """Right-handed frame of a triangle (3 points, 3), its axes as columns."""
+    """Right-handed frame (3, 3) of a triangle X (3, 3), one corner per row; its axes are the columns."""
     x = X[1] - X[0]
     z = np.cross(x, X[2] - X[0])
     x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)

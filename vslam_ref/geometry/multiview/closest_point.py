@@ -19,7 +19,14 @@ from vslam_ref.arrays import Array, as_array, times
 
 
 class Midpoint(NamedTuple):
-    """Point (..., 3), and its Jacobians (..., 3, 3) in both centres and both directions."""
+    """Point, and its Jacobians in both centres and both directions.
+
+    Attributes
+    ----------
+    value : ndarray, shape (..., 3)
+        In the unit of the centres.
+    J_p_a, J_b_a, J_p_b, J_b_b : ndarray, shape (..., 3, 3)
+    """
 
     value: Array
     J_p_a: Array
@@ -35,14 +42,15 @@ def midpoint(p_a: ArrayLike, b_a: ArrayLike, p_b: ArrayLike, b_b: ArrayLike) -> 
 
     Parameters
     ----------
-    p_a, p_b : array_like, shape (..., 3)
-        Points on the lines, such as camera centres, in one frame.
-    b_a, b_b : array_like, shape (..., 3)
-        Directions in that frame, of any length.
+    p_a, b_a : array_like, shapes (..., 3), (..., 3)
+        Point on the first line, such as a camera's centre, in any unit, and a direction of any length.
+    p_b, b_b : array_like, shapes (..., 3), (..., 3)
+        The same of the second line, in the same frame.
 
     Returns
     -------
     ndarray, shape (..., 3)
+        In the unit of the points.
 
     Raises
     ------

@@ -17,14 +17,17 @@ from vslam_ref.geometry import se3, so3
 
 
 def relative_motion(T_a_world: ArrayLike, T_b_world: ArrayLike) -> Array:
-    """``T_b_a`` of two poses (..., 4, 4): T_b_world T_a_world^-1."""
+    """``T_b_a`` (..., 4, 4) of ``T_a_world (..., 4, 4)`` and ``T_b_world (..., 4, 4)``.
+
+    T_b_a = T_b_world T_a_world^-1; translations in any unit.
+    """
     return se3.compose(T_b_world, se3.inverse(T_a_world))
 
 
 def essential_from_motion(T_b_a: ArrayLike) -> Array:
     """Essential matrix E = hat(t) R of a motion (..., 4, 4), with b_b^T E b_a = 0 for bearings of one point.
 
-    Implements :eq:`eq-essential`.
+    Implements :eq:`eq-essential`.  E (..., 3, 3) has the unit of the translation, any; bearings have none.
 
     Examples
     --------
@@ -39,14 +42,19 @@ def essential_from_motion(T_b_a: ArrayLike) -> Array:
 
 
 def fundamental_from_essential(E: ArrayLike, K_a: ArrayLike, K_b: ArrayLike) -> Array:
-    """F = K_b^-T E K_a^-1, (..., 3, 3): the same relation between the pixels (u, v, 1) of pinholes."""
+    """F = K_b^-T E K_a^-1, (..., 3, 3): the same relation between the pixels (u, v, 1) of pinholes.
+
+    ``E (..., 3, 3)``, ``K_a (..., 3, 3)``, ``K_b (..., 3, 3)``; focal lengths and centres in pixels.
+    """
     inverse_a = np.asarray(np.linalg.inv(as_array("K_a", K_a, 3, 3)), dtype=np.float64)
     inverse_b = np.asarray(np.linalg.inv(as_array("K_b", K_b, 3, 3)), dtype=np.float64)
     return np.asarray(transpose(inverse_b) @ as_array("E", E, 3, 3) @ inverse_a)
 
 
 def epipolar_distance(F: ArrayLike, uv_a: ArrayLike, uv_b: ArrayLike) -> Array:
-    """Signed distance, pixels, of ``uv_b`` (..., 2) from the epipolar line of ``uv_a`` in image b.
+    """Signed distance (...), pixels, of ``uv_b (..., 2)`` from the line F (u_a, v_a, 1) in image b.
+
+    ``F (..., 3, 3)``, ``uv_a (..., 2)`` in pixels.
 
     Implements :eq:`eq-epipolar-distance`.
     At the epipole there is no line; the distance is then 0, as every line passes.

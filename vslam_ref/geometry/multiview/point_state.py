@@ -13,7 +13,7 @@ StateArray = NDArray[np.int8]
 class PointState(IntEnum):
     """State of one point: the first of TOO_FEW, NO_RAY, ... that applies.
 
-    With too little parallax the side on which nearly parallel rays meet is noise, so that is told first.
+    With too little parallax the side on which nearly parallel rays meet is noise, so that is reported first.
 
     Examples
     --------

@@ -134,8 +134,8 @@ def _degenerate(b: Array, X: Array) -> list[str]:
     line = area <= np.maximum(THIN * sides.max(axis=1) ** 2, rounding * sides.max(axis=1))
     one = np.min([np.linalg.norm(np.cross(b[:, i], b[:, j]), axis=1) for i, j in PAIRS], axis=0) <= THIN
     names = ("two points are the same", "the points lie on one line", "two bearings are the same")
-    told = np.stack([same, line, one], 1)
-    return [names[int(np.argmax(row))] if row.any() else "" for row in told]
+    open_by = np.stack([same, line, one], 1)
+    return [names[int(np.argmax(row))] if row.any() else "" for row in open_by]
 
 
 def conics(b: Array, X: Array) -> tuple[Array, Array]:

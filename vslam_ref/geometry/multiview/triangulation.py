@@ -147,7 +147,7 @@ def _checked(T: Array, bearings: ArrayLike, mask: ArrayLike | None) -> tuple[Arr
 
 
 def refuse(bad: BoolArray, values: Array, what: str, right: str) -> None:
-    """Raise ValueError for the first bad value of (N, V, k), with what would be right."""
+    """Raise ValueError for the first of ``bad (N, V)`` in ``values (N, V, k)``, with what would be right."""
     if bad.any():
         n, v = np.argwhere(bad)[0]
         raise ValueError(f"{what} of point {n} in view {v} is {values[n, v].tolist()}: {right}")

@@ -41,7 +41,15 @@ from vslam_ref.arrays import Array, as_array, transpose
 
 
 class CorrectedPair(NamedTuple):
-    """Pixels (N, 2) in both images that fit F, and the squared distance (N,) that they were moved."""
+    """A pair of pixels that fits F, and how far it was moved.
+
+    Attributes
+    ----------
+    uv_a, uv_b : ndarray, shape (N, 2)
+        Pixels.
+    cost : ndarray, shape (N,)
+        Sum of both squared distances from what was measured, px^2.
+    """
 
     uv_a: Array
     uv_b: Array

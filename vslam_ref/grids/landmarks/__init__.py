@@ -19,14 +19,14 @@ The whole loop of pose, S, D and landmarks is :mod:`vslam_ref.systems.grid_slam`
 from vslam_ref.grids.landmarks.association import Association, Signature, associate, gate, look_alike
 from vslam_ref.grids.landmarks.field import DistanceField, distance_field, sample, scan_residuals
 from vslam_ref.grids.landmarks.landmark_map import Landmark, LandmarkConfig, LandmarkMap, seen_through
-from vslam_ref.grids.landmarks.lines import CornerConfig, Corners, cross, scan_corners
+from vslam_ref.grids.landmarks.lines import CornerConfig, ScanCorners, cross, scan_corners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, MapCorners, map_corners, static_along_arms
 from vslam_ref.grids.landmarks.matching import Match, MatchConfig, correlative, match_scan, thin
 
 __all__ = [
     "Association",
     "CornerConfig",
-    "Corners",
+    "ScanCorners",
     "DistanceField",
     "Landmark",
     "LandmarkConfig",

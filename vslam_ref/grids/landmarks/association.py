@@ -6,7 +6,7 @@ A corner z seen from a pose with covariance P belongs to a landmark only if the 
 
 lies inside the 99 % gate of chi^2 with two degrees of freedom, 9.21, and if the corner looks the same way
 and is of the same kind.  Two landmarks inside one gate are look-alikes that the robot's position cannot
-tell apart: then the corner says nothing.
+distinguish: then the corner says nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ GATE = 9.210340371976184
 
 
 class Signature(NamedTuple):
-    """How corners look: bisectors in one frame and openings (n,), radians; whether they are convex (n,)."""
+    """How corners look: ``bisector (n,)`` in one frame and ``opening (n,)``, radians; ``convex (n,)``."""
 
     bisector: Array
     opening: Array

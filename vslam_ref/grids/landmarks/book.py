@@ -55,7 +55,7 @@ def corner(runs: tuple[Array, Array], sigma: float, floor: float) -> Corner:
 
 
 def gaussian(offset: Array, sigma: float) -> Array:
-    """Weights of a window that ends at four sigma; they add up to 1 over whole numbers."""
+    """Weights of a window at offset (n,), up to four sigma; they add up to 1 over whole numbers."""
     reach = np.arange(-int(4 * sigma + 0.5), int(4 * sigma + 0.5) + 1)
     w = np.exp(-0.5 * (offset / sigma) ** 2) / np.exp(-0.5 * (reach / sigma) ** 2).sum()
     return np.where(np.abs(offset) <= reach[-1], w, 0.0)
@@ -79,7 +79,7 @@ def corner_of_map(
 
 
 def static_share(P_S: Array, side: float, xy: Array, arm: float) -> float:
-    """Share of the places along an arm of a corner, up to 0.3 m, beside which S has decided a cell."""
+    """Share of an arm of a corner xy (2,), up to 0.3 m, along which S, P_S (rows, columns), is decided."""
     way = np.array([math.cos(arm), math.sin(arm)])
     places = [xy + s * way for s in np.arange(side, 0.3 + 1e-9, side / 2)]
     cells = [(math.floor(y / side), math.floor(x / side)) for x, y in places]
@@ -89,14 +89,17 @@ def static_share(P_S: Array, side: float, xy: Array, arm: float) -> float:
 def observe(x: Array, j: int) -> tuple[Array, Array]:
     """Landmark j as seen from the pose, h = R(theta)^T (m_j - p), and its Jacobian H (2, 3 + 2n)."""
     R, m = so2.exp(x[2]), slice(3 + 2 * j, 5 + 2 * j)
-    h = R.T @ (x[m] - x[:2])
+    h = R.T @ (x[m] - x[:2])  # eq-b21
     H = np.zeros((2, len(x)))
-    H[:, :2], H[:, 2], H[:, m] = -R.T, [h[1], -h[0]], R.T
+    H[:, :2], H[:, 2], H[:, m] = -R.T, [h[1], -h[0]], R.T  # eq-jacobians-measurement
     return h, H
 
 
 def associate(x: Array, P: Array, corners: list[Corner], marks: list[Corner]) -> list[int]:
-    """Landmark of each corner of a scan, or NONE, or AMBIGUOUS; ``marks`` say how landmarks look."""
+    """Landmark of each corner of a scan, or NONE, or AMBIGUOUS; ``marks`` say how landmarks look.
+
+    State ``x (D,)``, covariance ``P (D, D)``; metres and radians.
+    """
     inside = np.zeros((len(corners), len(marks)), dtype=bool)
     for i, z in enumerate(corners):
         for j, mark in enumerate(marks):
@@ -115,7 +118,7 @@ def associate(x: Array, P: Array, corners: list[Corner], marks: list[Corner]) ->
 
 
 def update(x: Array, P: Array, H: Array, innovation: Array, cov: Array) -> tuple[Array, Array]:
-    """Kalman update of pose and landmarks."""
+    """Kalman update of x (D,), P (D, D) by an innovation (k,) with cov (k, k) and Jacobian H (k, D)."""
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + cov)  # eq-gain
     x = x + K @ innovation
     x[2] = so2.wrap(x[2])
@@ -125,7 +128,7 @@ def update(x: Array, P: Array, H: Array, innovation: Array, cov: Array) -> tuple
 def localise(
     x: Array, P: Array, corners: list[Corner], marks: list[Corner]
 ) -> tuple[Array, Array, list[int]]:
-    """Update with all corners that belong to a landmark, linearised at one x."""
+    """Update x (D,), P (D, D) with all corners that belong to a landmark, linearised at one x."""
     which = associate(x, P, corners, marks)
     seen = [(z, *observe(x, j)) for z, j in zip(corners, which, strict=True) if j >= 0]
     if not seen:
@@ -158,7 +161,10 @@ class Floor:
 def match(
     p_bar: Array, P_bar: Array, points: Array, floor: Floor, sigma: float, cut: float
 ) -> tuple[Array, Array]:
-    """Most probable pose of a scan of points (n, 2), and the information A of the scan alone."""
+    """Most probable pose of a scan of points (n, 2), and the information A (3, 3) of the scan alone.
+
+    Prediction ``p_bar (3,)``, ``P_bar (3, 3)``; metres and radians.
+    """
 
     def cost(p: Array) -> float:
         off = p - p_bar
@@ -180,7 +186,7 @@ def match(
 
 
 def residuals(p: Array, points: Array, floor: Floor) -> list[tuple[float, Array]]:
-    """Distance from what is static, and its Jacobian (3,) in the pose, of every scan point."""
+    """Distance from what is static, and its Jacobian (3,) in the pose p (3,), of each of points (n, 2)."""
     found = []
     for x in points:
         lever = so2.exp(p[2]) @ x
@@ -191,7 +197,7 @@ def residuals(p: Array, points: Array, floor: Floor) -> list[tuple[float, Array]
 
 
 def use_match(x: Array, P: Array, p: Array, A: Array) -> tuple[Array, Array]:
-    """Update with a match (p, A), in the directions that the scan knows; x and P are the prediction."""
+    """Update x (D,), P (D, D) with a match p (3,), A (3, 3), in the directions that the scan determines."""
     values, V = np.linalg.eigh(A)
     known = values > 1e-6 * values.max()
     v, off = V[:, known].T, p - x[:3]

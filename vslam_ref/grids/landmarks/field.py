@@ -47,7 +47,7 @@ class Sampled(NamedTuple):
     slope: Array
 
 
-class Residuals(NamedTuple):
+class FieldResiduals(NamedTuple):
     """Value (..., 1) Jacobians in the pose's (x, y, theta) (..., 1, 3), in the scan point (..., 1, 2)."""
 
     value: Array
@@ -130,8 +130,11 @@ def scan_residuals(T_world_laser: ArrayLike, points: ArrayLike, field: DistanceF
 
 def scan_residuals_with_jacobians(
     T_world_laser: ArrayLike, points: ArrayLike, field: DistanceField
-) -> Residuals:
-    """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters."""
+) -> FieldResiduals:
+    """:func:`scan_residuals` and its Jacobians, in the filter's (x, y, theta); same parameters.
+
+    Implements the Jacobian of :eq:`eq-field-residual`.
+    """
     T_world_laser, points = np.asarray(T_world_laser, dtype=np.float64), np.asarray(points, dtype=np.float64)
     world = se2.act(T_world_laser, points)
     at = sampled(world, field)
@@ -139,7 +142,7 @@ def scan_residuals_with_jacobians(
     turn = at.slope[..., 1] * lever[..., 0] - at.slope[..., 0] * lever[..., 1]
     J_pose = np.concatenate([at.slope, turn[..., None]], -1)
     J_point = at.slope[..., None, :] @ so2.exp(T_world_laser[..., 2])
-    return Residuals(at.value[..., None], J_pose[..., None, :], J_point)
+    return FieldResiduals(at.value[..., None], J_pose[..., None, :], J_point)
 
 
 def pose_difference(a: ArrayLike, b: ArrayLike) -> Array:

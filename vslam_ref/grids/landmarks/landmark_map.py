@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids.landmarks.association import TURN, Signature, look_alike
-from vslam_ref.grids.landmarks.lines import Corners
+from vslam_ref.grids.landmarks.lines import ScanCorners
 from vslam_ref.grids.landmarks.map_corners import MapCornerConfig, map_corners, static_along_arms
 from vslam_ref.grids.log_odds import LogOddsGrid
 from vslam_ref.grids.scan import ScanLike, unit_vectors
@@ -134,7 +134,7 @@ class LandmarkMap:
         self,
         scan: int,
         T_world_laser: ArrayLike,
-        corners: Corners,
+        corners: ScanCorners,
         unclaimed: BoolArray,
         places: Array,
         static: LogOddsGrid,
@@ -147,7 +147,7 @@ class LandmarkMap:
             Number of this scan.
         T_world_laser : array_like, shape (3,)
             ``T_world_laser``.
-        corners : Corners
+        corners : ScanCorners
             Of this scan, in the laser's frame.
         unclaimed : ndarray of bool, shape (m,)
             Corners that no landmark's gate holds.

@@ -74,14 +74,22 @@ class Lines(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Value (..., 2), where two lines cross, and its Jacobians (..., 2, 2) in offsets and angles."""
+    """Where two lines cross.
+
+    Attributes
+    ----------
+    value : ndarray, shape (..., 2)
+        Metres.
+    J_offset, J_angle : ndarray, shape (..., 2, 2)
+        Jacobians in both offsets, and in both angles (metres per radian).
+    """
 
     value: Array
     J_offset: Array
     J_angle: Array
 
 
-class Corners(NamedTuple):
+class ScanCorners(NamedTuple):
     """Corners of one scan, in the laser's frame.
 
     Attributes
@@ -141,6 +149,7 @@ def cross(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -
 def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -> Crossing:
     """:func:`cross` and its Jacobians; same parameters.
 
+    Implements :eq:`eq-corner-crossing` and its derivatives.
     Differentiate n_i . (X - c_i) = offset_i.  A turn of line i moves its normal by -t_i, so that
     n_i . dX = d offset_i + (t_i . (X - c_i)) d angle_i: the lever is the distance from the line's middle.
     """
@@ -161,7 +170,9 @@ def cross_with_jacobians(centre: ArrayLike, angle: ArrayLike, offset: ArrayLike 
 
 
 def fit_lines(points: Array, beams: IntArray, runs: list[tuple[int, int]], sigma: float) -> Lines:
-    """Lines by total least squares through ``points[a:b]`` for each run (a, b) of ``beams``.
+    """Lines by total least squares through ``points[a:b]`` for each run (a, b).
+
+    ``points (n, 2)``, metres, and the numbers of their ``beams (n,)``.
 
     Implements :eq:`eq-line-variances`.
     """
@@ -209,7 +220,7 @@ def straight_runs(points: Array, config: CornerConfig) -> list[tuple[int, int]]:
     return runs
 
 
-def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | None = None) -> Corners:
+def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | None = None) -> ScanCorners:
     """Corners that one scan shows.
 
     Parameters
@@ -221,7 +232,7 @@ def scan_corners(angles: ArrayLike, ranges: ArrayLike, config: CornerConfig | No
 
     Returns
     -------
-    Corners
+    ScanCorners
         With the covariance of both lines, :eq:`eq-corner-cov`; possibly none.
 
     Raises
@@ -259,7 +270,7 @@ def _long_runs(points: Array, c: CornerConfig) -> list[tuple[int, int]]:
     return kept
 
 
-def _meet(lines: Lines, c: CornerConfig) -> Corners:
+def _meet(lines: Lines, c: CornerConfig) -> ScanCorners:
     """Corners of neighbouring lines whose ends come near to where they cross."""
     n = len(lines.angle)
     pair = np.stack([np.arange(n - 1), np.arange(1, n)], 1) if n > 1 else np.zeros((0, 2), dtype=np.int64)
@@ -280,4 +291,4 @@ def _meet(lines: Lines, c: CornerConfig) -> Corners:
     opening = np.abs(so2.wrap(on - back))
     bisector = so2.wrap(back + so2.wrap(on - back) / 2)
     towards = np.cos(bisector) * xy[:, 0] + np.sin(bisector) * xy[:, 1]
-    return Corners(xy, cov, bisector, opening, towards > 0.0, np.stack([back, on], 1))
+    return ScanCorners(xy, cov, bisector, opening, towards > 0.0, np.stack([back, on], 1))

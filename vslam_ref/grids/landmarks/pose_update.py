@@ -32,7 +32,7 @@ def pose_measurement(
     Parameters
     ----------
     T_world_laser : array_like, shape (3,)
-        Most probable pose x.
+        Most probable pose x = (x, y, theta), metres and radians.
     information : array_like, shape (3, 3)
         A, of the scan alone.
     predicted, cov : array_like, shapes (3,), (3, 3)
@@ -57,7 +57,10 @@ def pose_measurement(
 
 
 def pose_update(blocks: Blocks, H: ArrayLike, innovation: ArrayLike, variance: ArrayLike) -> None:
-    """Kalman update of pose and landmarks, in place, by H (k, 3) on the pose of one run (a batch of 1)."""
+    """Kalman update of pose and landmarks, in place, by a measurement of the pose of one run (a batch of 1).
+
+    ``H (k, 3)``, ``innovation (k,)``, ``variance (k,)`` of :func:`pose_measurement`; metres and radians.
+    """
     H, innovation = np.asarray(H, dtype=np.float64)[None], np.asarray(innovation, dtype=np.float64)[None]
     if H.shape[1] == 0:
         return

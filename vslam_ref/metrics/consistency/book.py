@@ -25,7 +25,7 @@ Run = Callable[[np.random.Generator], Iterable[tuple[Array, Array, Array]]]
 
 
 def pose_error(truth: Array, mean: Array) -> Array:
-    """E = truth - estimate of poses (x, y, theta), metres and radians, the angle in (-pi, pi]."""
+    """E = truth (3,) - mean (3,) of poses (x, y, theta), metres and radians, the angle in (-pi, pi]."""
     e = truth - mean
     e[2] = np.arctan2(np.sin(e[2]), np.cos(e[2]))
     return e
@@ -74,7 +74,7 @@ def bootstrap_interval(
     samples: int = 2000,
     level: float = 0.95,
 ) -> tuple[float, float]:
-    """Interval of a statistic of the mean curve: whole runs are drawn again, M out of M with replacement."""
+    """Interval of a statistic of the mean of q (M, T): M whole runs are drawn again, with replacement."""
     M, values = len(q), []
     for _ in range(samples):
         times_drawn = rng.multinomial(M, np.full(M, 1 / M))

@@ -100,7 +100,10 @@ def mean_curves(weights: ArrayLike, data: ArrayLike) -> Array:
 
 
 def apply(weights: ArrayLike, data: ArrayLike, statistic: Statistic) -> Array:
-    """Statistic of every draw's mean curve, (S,), in chunks of :data:`CHUNK` draws."""
+    """Statistic of the mean curve of every draw, (S,), from ``weights (S, M)`` and ``data (M, T)``.
+
+    In chunks of :data:`CHUNK` draws.  Weights have no unit; the answer has that of the statistic.
+    """
     w = np.asarray(weights, dtype=np.float64)
     parts = [statistic(mean_curves(w[i : i + CHUNK], data)) for i in range(0, len(w), CHUNK)]
     return np.concatenate([np.asarray(p, dtype=np.float64) for p in parts])

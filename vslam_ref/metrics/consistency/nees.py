@@ -219,6 +219,8 @@ def heading_vector_error(truth: ArrayLike, lifted_mean: ArrayLike) -> Array:
 def nees_singular(error: ArrayLike, cov: ArrayLike, *, steps: int = 1) -> NormalisedSquare:
     r"""NEES under a covariance that may be singular: ``e^T P^+ e`` with rank P degrees of freedom.
 
+    Implements :eq:`eq-nees`, with the pseudo-inverse where P is singular.
+
     Parameters
     ----------
     error : array_like, shape (..., d)

@@ -25,7 +25,7 @@ class Pairs(NamedTuple):
     Attributes
     ----------
     estimate, truth : ndarray of int, shape (M,)
-        Both rise strictly.
+        Numbers of poses, no unit; both rise strictly.
     """
 
     estimate: IntArray

@@ -36,7 +36,7 @@ class AbsoluteError:
     stats : Summary
         Of the errors, metres.
     alignment : Alignment
-        ``S_truth_estimate``; its ``reason`` tells if the points leave a part of it open.
+        ``S_truth_estimate``; its ``reason`` says if the points leave a part of it undetermined.
     aligned : Trajectory
         The estimate in the frame of the truth: scaled, turned and moved.
     """

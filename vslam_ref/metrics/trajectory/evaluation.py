@@ -1,4 +1,4 @@
-"""One estimate against one truth: pairs, absolute error, relative error."""
+"""One estimate against one truth: pairs, absolute error, relative error; metres, radians, seconds."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Summary(NamedTuple):
 
 
 def summary(errors: ArrayLike) -> Summary:
-    """Summarise errors, shape (N,), N >= 1.
+    """Summarise errors, shape (N,), N >= 1, in any unit; the summary has the same unit.
 
     Raises
     ------

@@ -12,25 +12,25 @@ module                        holds
 ============================  =====================================================================
 """
 
-from vslam_ref.systems.slam_log.calibration import Calibration
+from vslam_ref.systems.slam_log.calibration import RobotCalibration
 from vslam_ref.systems.slam_log.evaluate import KEYS, Placed, place, summary, truth_at
-from vslam_ref.systems.slam_log.log import Drive, Sighting, SlamLog, Truth
-from vslam_ref.systems.slam_log.runner import FILTERS, LogRun, RunSettings, Seen, run_log
+from vslam_ref.systems.slam_log.log import Drive, LoggedSighting, LogTruth, SlamLog
+from vslam_ref.systems.slam_log.runner import FILTERS, LogRun, RunSettings, SeenLandmarks, run_log
 from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
 
 __all__ = [
     "FILTERS",
     "KEYS",
-    "Calibration",
+    "RobotCalibration",
     "Drive",
     "LogRun",
     "Placed",
     "RunSettings",
-    "Seen",
-    "Sighting",
+    "SeenLandmarks",
+    "LoggedSighting",
     "SlamLog",
     "Timeline",
-    "Truth",
+    "LogTruth",
     "build_timeline",
     "place",
     "run_log",

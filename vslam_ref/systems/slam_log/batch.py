@@ -29,7 +29,7 @@ from vslam_ref.estimation.least_squares import Ceres, Descent, Options, Step, de
 from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.filters import observation
 from vslam_ref.geometry import se2, so2
-from vslam_ref.systems.slam_log import Calibration, LogRun, SlamLog, build_timeline
+from vslam_ref.systems.slam_log import LogRun, RobotCalibration, SlamLog, build_timeline
 from vslam_ref.systems.slam_log.preintegration import RelativePoses, preintegrate
 from vslam_ref.systems.slam_log.timeline import sighting_times
 
@@ -55,7 +55,7 @@ SENSOR_ONLY = ("sensor_ahead", "bearing_offset", "range_offset", "range_cosine")
 """Those that say nothing about odometry."""
 
 
-Place = tuple[Array, Array, Calibration]
+Place = tuple[Array, Array, RobotCalibration]
 """Poses (K, 3), landmarks (n, 2), and the calibration."""
 
 
@@ -68,7 +68,7 @@ class Batch(NamedTuple):
         Node times, seconds.
     poses : ndarray, shape (K, 3)
     ids, landmarks : ndarray, shapes (n,), (n, 2)
-    calibration : Calibration
+    calibration : RobotCalibration
         With the values that were unknown.
     cost : float
     odometry : ndarray, shape (K - 1, 3)
@@ -89,7 +89,7 @@ class Batch(NamedTuple):
     poses: Array
     ids: IntArray
     landmarks: Array
-    calibration: Calibration
+    calibration: RobotCalibration
     cost: float
     odometry: Array
     sightings: Array
@@ -105,26 +105,28 @@ class _Problem:
 
     def __init__(self, log: SlamLog, free: Sequence[str]) -> None:
         self.log, self.free = log, tuple(free)
-        self._kept: tuple[Calibration, RelativePoses, Array] | None = None
+        self._kept: tuple[RobotCalibration, RelativePoses, Array] | None = None
         self.node = np.repeat(np.arange(len(log.sightings)), [len(s.ids) for s in log.sightings])
         all_ids = np.concatenate([s.ids for s in log.sightings])
         self.ids, self.landmark = np.unique(all_ids, return_inverse=True)
         self.polar = np.concatenate([s.polar for s in log.sightings])
 
-    def odometry(self, calibration: Calibration) -> tuple[RelativePoses, Array]:
+    def odometry(self, calibration: RobotCalibration) -> tuple[RelativePoses, Array]:
         """Odometry between sightings and the inverse Cholesky factors of its covariance; the last kept."""
         key = replace(calibration, **dict.fromkeys(SENSOR_ONLY, 0.0))
         if self._kept is None or self._kept[0] != key:
             self._kept = (key, *self._odometry(calibration))
         return self._kept[1:]
 
-    def _odometry(self, calibration: Calibration) -> tuple[RelativePoses, Array]:
+    def _odometry(self, calibration: RobotCalibration) -> tuple[RelativePoses, Array]:
         line = build_timeline(self.log, calibration, np.zeros(0))
         relative = preintegrate(line, line.sighting_at)
         floor = np.diag([1e-4, 1e-4, 1e-4]) ** 2  # a vehicle at rest would have none at all
         return relative, np.linalg.inv(np.linalg.cholesky(relative.cov + floor))
 
-    def seen(self, poses: Array, landmarks: Array, calibration: Calibration) -> tuple[Array, Array, Array]:
+    def seen(
+        self, poses: Array, landmarks: Array, calibration: RobotCalibration
+    ) -> tuple[Array, Array, Array]:
         """Predicted (range, bearing) (N, 2) and Jacobians in pose (N, 2, 3) and landmark (N, 2, 2)."""
         at = observation.vehicle_from_world_with_jacobians(poses[self.node], landmarks[self.landmark])
         x, y = at.value[:, 0] - calibration.sensor_ahead, at.value[:, 1]
@@ -132,7 +134,7 @@ class _Problem:
         J = np.stack([np.stack([x / r, y / r], -1), np.stack([-y, x], -1) / (r * r)[:, None]], 1)
         return np.stack([r, np.arctan2(y, x)], -1), J @ at.J_pose, J @ at.J_landmark
 
-    def residuals(self, poses: Array, landmarks: Array, calibration: Calibration) -> tuple[Array, Array]:
+    def residuals(self, poses: Array, landmarks: Array, calibration: RobotCalibration) -> tuple[Array, Array]:
         """Whitened residuals of odometry (K - 1, 3) and of sightings (N, 2)."""
         relative, whiten = self.odometry(calibration)
         e = se2.between(poses[:-1], poses[1:]) - relative.mean
@@ -184,7 +186,7 @@ class _Problem:
         return poses, landmarks + step.change[split:end].reshape(-1, 2), replace(calibration, **values)
 
     def jacobian(
-        self, poses: Array, landmarks: Array, calibration: Calibration, root: Array
+        self, poses: Array, landmarks: Array, calibration: RobotCalibration, root: Array
     ) -> sparse.csr_matrix:
         """Whitened Jacobian: columns are poses 1.., landmarks, free calibration values.
 
@@ -212,7 +214,7 @@ class _Problem:
         return sparse.hstack([whole, border]).tocsr()
 
     def _calibration_columns(
-        self, poses: Array, landmarks: Array, calibration: Calibration, root: Array
+        self, poses: Array, landmarks: Array, calibration: RobotCalibration, root: Array
     ) -> sparse.csr_matrix:
         columns = []
         for name in self.free:
@@ -241,7 +243,7 @@ def _blocks(values: Array, rows: IntArray, columns: IntArray, shape: tuple[int, 
 
 def solve_batch(
     log: SlamLog,
-    calibration: Calibration,
+    calibration: RobotCalibration,
     start: LogRun,
     free: Sequence[str] = (),
     max_iterations: int = 60,
@@ -251,7 +253,7 @@ def solve_batch(
     Parameters
     ----------
     log : SlamLog
-    calibration : Calibration
+    calibration : RobotCalibration
         Values held, and start values of the free ones.
     start : LogRun
         A filter's run of the same log, from which the solution starts.

@@ -21,7 +21,7 @@ def _value(default: float, unit: str, what: str) -> float:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class RobotCalibration:
     """Gains and offsets of odometry and sensor, and the noises of both.
 
     The increment of a time step is ds = distance_gain ds', dalpha = turn_gain dalpha' + drift ds, where
@@ -62,8 +62,8 @@ class Calibration:
                 raise ValueError(f"{entry.name}={value}: must be > 0")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Calibration:
-        """Build from a mapping; a name that is none of the fields raises a ValueError."""
+    def from_mapping(cls, values: Mapping[str, Any]) -> RobotCalibration:
+        """Build from a mapping; an unknown name raises a ValueError."""
         known = [entry.name for entry in fields(cls)]
         for name in values:
             if name not in known:

@@ -18,7 +18,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.geometry import se2, so2
 from vslam_ref.metrics.alignment import align_rigid, root_mean_square
 from vslam_ref.metrics.consistency import nees, pose_error
-from vslam_ref.systems.slam_log.log import Truth
+from vslam_ref.systems.slam_log.log import LogTruth
 from vslam_ref.systems.slam_log.runner import LogRun
 
 KEYS = (
@@ -68,12 +68,12 @@ class Placed(NamedTuple):
         return nees(self.errors, self.covs).value
 
 
-def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
+def truth_at(truth: LogTruth, times: Array) -> tuple[NDArray[np.bool_], Array]:
     """Interpolate the truth linearly in time.
 
     Parameters
     ----------
-    truth : Truth
+    truth : LogTruth
     times : ndarray, shape (N,)
         Seconds.
 
@@ -97,10 +97,10 @@ def truth_at(truth: Truth, times: Array) -> tuple[NDArray[np.bool_], Array]:
     return ok, poses
 
 
-def place(run: LogRun, truth: Truth, *, aligned: bool) -> Placed | None:
+def place(run: LogRun, truth: LogTruth, *, aligned: bool) -> Placed | None:
     """Put a run into the world.
 
-    Returns None where the truth cannot tell: no overlap in time, or, unaligned, no true heading.
+    Returns None where the truth does not determine it: no overlap in time, or, unaligned, no true heading.
     """
     ok, true = truth_at(truth, run.times)
     poses, covs = reference_point(run.T_run_vehicle[ok], run.covs[ok], truth.lever)
@@ -130,8 +130,9 @@ def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Arr
 
     Returns
     -------
-    poses, covs : ndarray, shapes (N, 3), (N, 3, 3)
+    poses : ndarray, shape (N, 3)
         In the same frame.
+    covs : ndarray, shape (N, 3, 3)
     """
     arm = so2.rotate(poses[:, 2], np.broadcast_to(lever, (len(poses), 2)))
     J = np.tile(np.eye(3), (len(poses), 1, 1))
@@ -140,7 +141,7 @@ def reference_point(poses: Array, covs: Array, lever: Array) -> tuple[Array, Arr
     return moved, J @ covs @ J.swapaxes(1, 2)
 
 
-def errors_while_blind(run: LogRun, truth: Truth, after: float = 5.0) -> dict[str, float | None]:
+def errors_while_blind(run: LogRun, truth: LogTruth, after: float = 5.0) -> dict[str, float | None]:
     """Errors while landmarks are in sight, and more than ``after`` seconds behind the last sighting.
 
     Returns
@@ -164,13 +165,13 @@ def errors_while_blind(run: LogRun, truth: Truth, after: float = 5.0) -> dict[st
     return result
 
 
-def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:
+def landmark_errors(run: LogRun, truth: LogTruth, T_world_run: Array) -> Array:
     """Errors of the landmarks that are in both maps: truth minus estimate.
 
     Parameters
     ----------
     run : LogRun
-    truth : Truth
+    truth : LogTruth
     T_world_run : ndarray, shape (3,)
         Motion that puts the run into the world.
 
@@ -187,7 +188,7 @@ def landmark_errors(run: LogRun, truth: Truth, T_world_run: Array) -> Array:
     return np.asarray(theirs - se2.act(T_world_run, mine))
 
 
-def summary(run: LogRun, truth: Truth | None) -> dict[str, float | int | None]:
+def summary(run: LogRun, truth: LogTruth | None) -> dict[str, float | int | None]:
     """The numbers of :data:`KEYS`; None where there is no truth for one.
 
     Position and landmark errors are aligned unless the key says otherwise; the heading error is taken

@@ -7,8 +7,8 @@ Two steps, on all logs of the set together:
    estimates are averaged with their information matrices, so all robots get the same values;
 2. *everything, noises above all*, where the innovations of the EKF and of the IEKF together are most
    likely: the values favour neither filter.  An innovation's covariance holds odometry noise, sensor
-   noise and map; one that is too small or too large costs likelihood.  One sighting in a hundred is
-   allowed to be anything inside the sensor's field, or a few misread barcodes would inflate every
+   noise and map; one that is too small or too large costs likelihood.  One sighting in a hundred may
+   lie anywhere inside the sensor's field, or a few misread barcodes would inflate every
    sigma.  One value at a time is moved to the summit of a parabola, gains in units of their standard
    errors from step 1, sigmas in their logarithms.
 
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.systems.slam_log import Calibration, LogRun, RunSettings, SlamLog, run_log
+from vslam_ref.systems.slam_log import LogRun, RobotCalibration, RunSettings, SlamLog, run_log
 from vslam_ref.systems.slam_log.batch import Batch, solve_batch
 from vslam_ref.systems.slam_log.runner import iekf, iekf_first_order
 
@@ -41,7 +41,7 @@ FREE = {
 """Gains and offsets each set lets vary."""
 
 START = {
-    "mrclam": Calibration(
+    "mrclam": RobotCalibration(
         sighting_delay=0.2,
         range_cosine=1.0,
         sigma_distance=0.1,
@@ -50,7 +50,7 @@ START = {
         sigma_range=0.1,
         sigma_bearing=0.015,
     ),
-    "victoria_park": Calibration(
+    "victoria_park": RobotCalibration(
         sigma_distance=0.1, sigma_turn=0.1, sigma_drift=0.02, sigma_range=0.3, sigma_bearing=0.02
     ),
 }
@@ -87,8 +87,8 @@ def pooled_gains(batches: Sequence[Batch]) -> tuple[Array, Array]:
 
 
 def fit_gains(
-    logs: Sequence[SlamLog], calibration: Calibration, free: Sequence[str]
-) -> tuple[Calibration, list[Batch]]:
+    logs: Sequence[SlamLog], calibration: RobotCalibration, free: Sequence[str]
+) -> tuple[RobotCalibration, list[Batch]]:
     """Step 1: one batch solution per log, free values averaged."""
     batches = []
     for log in logs:
@@ -99,8 +99,8 @@ def fit_gains(
 
 
 def most_likely(
-    logs: Sequence[SlamLog], calibration: Calibration, units: dict[str, float]
-) -> tuple[Calibration, float]:
+    logs: Sequence[SlamLog], calibration: RobotCalibration, units: dict[str, float]
+) -> tuple[RobotCalibration, float]:
     """Step 2: move the values of ``units`` and the sigmas, one at a time, until the logs are most likely.
 
     The gate makes small steps in the likelihood; a parabola through points ``STRIDES`` units apart looks
@@ -109,7 +109,7 @@ def most_likely(
     Parameters
     ----------
     logs : sequence of SlamLog
-    calibration : Calibration
+    calibration : RobotCalibration
         Where the search begins.
     units : dict
         Gains and offsets to move -> size of one unit.
@@ -121,7 +121,7 @@ def most_likely(
     """
     areas = [field_area(log) for log in logs]
 
-    def likelihood(trial: Calibration) -> float:
+    def likelihood(trial: RobotCalibration) -> float:
         return sum(
             log_likelihood(run_log(log, trial, name, SETTINGS), area)
             for name in JUDGES
@@ -141,7 +141,7 @@ def most_likely(
     return calibration, best
 
 
-def moved(calibration: Calibration, name: str, step: float, units: dict[str, float]) -> Calibration:
+def moved(calibration: RobotCalibration, name: str, step: float, units: dict[str, float]) -> RobotCalibration:
     """One value moved by ``step`` units; a sigma by a third of that in its logarithm."""
     value = getattr(calibration, name)
     new = value * np.exp(step / 3) if name in NOISES else value + step * units[name]
@@ -177,7 +177,7 @@ def repeated_sightings(log: SlamLog, within: float = 0.5) -> dict[str, float | i
     return {"pairs": len(steps), "range_m": float(spread[0]), "bearing_rad": float(spread[1])}
 
 
-def identify(logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]) -> dict[str, Any]:
+def identify(logs: Sequence[SlamLog], start: RobotCalibration, free: Sequence[str]) -> dict[str, Any]:
     """Both steps; returns the document that is committed."""
     after_batch, batches = fit_gains(logs, start, free)
     _, cov = pooled_gains(batches)
@@ -196,12 +196,12 @@ def identify(logs: Sequence[SlamLog], start: Calibration, free: Sequence[str]) -
     }
 
 
-def _neutral(calibration: Calibration, name: str) -> Calibration:
+def _neutral(calibration: RobotCalibration, name: str) -> RobotCalibration:
     """Return the calibration with one gain at 1, or one offset at 0: what ignoring it costs."""
     return replace(calibration, **{name: 1.0 if name.endswith("_gain") else 0.0})
 
 
-def _evidence(log: SlamLog, calibration: Calibration, batch: Batch) -> dict[str, Any]:
+def _evidence(log: SlamLog, calibration: RobotCalibration, batch: Batch) -> dict[str, Any]:
     run = run_log(log, calibration, "ekf", SETTINGS)
     nis, area = run.seen.nis[run.seen.accepted], field_area(log)
     error = np.sqrt(np.diag(batch.free_cov))

@@ -2,7 +2,7 @@
 
 Seconds since the log's first control; metres; radians.  The vehicle frame has x ahead and y to the
 left, its origin at the middle of the driven axle; sightings are taken in the *sensor frame*, which the
-:class:`~vslam_ref.systems.slam_log.calibration.Calibration` places in the vehicle frame.
+:class:`~vslam_ref.systems.slam_log.calibration.RobotCalibration` places in the vehicle frame.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vslam_ref.arrays import Array, IntArray
 Drive = Literal["differential", "ackermann"]
 
 
-class Sighting(NamedTuple):
+class LoggedSighting(NamedTuple):
     """What was seen at one moment.
 
     Attributes
@@ -48,7 +48,7 @@ class SlamLog(NamedTuple):
     times : ndarray, shape (T,)
         Seconds, never decreasing.  Control k holds from times[k] to times[k + 1].
     controls : ndarray, shape (T, 2)
-    sightings : tuple of Sighting
+    sightings : tuple of LoggedSighting
         In order of time.
     dropped : mapping of str to int
         Sightings the reader left out, counted by reason.
@@ -60,11 +60,11 @@ class SlamLog(NamedTuple):
     clock_start: float
     times: Array
     controls: Array
-    sightings: tuple[Sighting, ...]
+    sightings: tuple[LoggedSighting, ...]
     dropped: Mapping[str, int]
 
 
-class Truth(NamedTuple):
+class LogTruth(NamedTuple):
     """Reference of a run in the world frame, on the log's time.
 
     Attributes

@@ -6,7 +6,7 @@ with independent noises in ds and dalpha.  A noise in step i moves the end of th
     d(x, y) = (cos theta_i, sin theta_i) e_ds + S (p_end - p_i) e_dalpha,     d theta = e_dalpha
 
 with S the quarter turn.  Sums of these squares over an interval are differences of running sums, so
-all intervals are done at once.
+all intervals are done at once.  Poses are in metres and radians.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vslam_ref.systems.slam_log.timeline import Timeline
 
 
 class RelativePoses(NamedTuple):
-    """Relative poses (K - 1, 3) between K nodes and covariances (K - 1, 3, 3), in each start's frame."""
+    """Relative poses, ``mean (K - 1, 3)`` with ``cov (K - 1, 3, 3)``, of K nodes, in each start's frame."""
 
     mean: Array
     cov: Array

@@ -25,7 +25,7 @@ from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam
 from vslam_ref.filters.estimates import MapEstimate, SlamFilter
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.metrics.consistency import nis
-from vslam_ref.systems.slam_log.calibration import Calibration
+from vslam_ref.systems.slam_log.calibration import RobotCalibration
 from vslam_ref.systems.slam_log.log import SlamLog
 from vslam_ref.systems.slam_log.timeline import Timeline, build_timeline
 
@@ -33,7 +33,7 @@ Build = Callable[[Array, Array, int], SlamFilter]
 
 
 def iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
-    """Seed B's filter with its map, and with exact Gaussian moments.
+    """Seed B's filter with its map, and with exact Gaussian moments, from ``mean (3,)`` and ``cov (3, 3)``.
 
     A heading that has become uncertain by e.g. 0.4 rad shortens the mean of the heading vector.  With
     first-order moments it keeps its length, and a linear correction then makes it, and every landmark's
@@ -43,7 +43,7 @@ def iekf(mean: Array, cov: Array, capacity: int) -> SlamFilter:
 
 
 def iekf_first_order(mean: Array, cov: Array, capacity: int) -> SlamFilter:
-    """Seed B's filter with its map, P0 and the control noise lifted by the Jacobian."""
+    """Seed B's filter, map and all, from ``mean (3,)``, ``cov (3, 3)``; moments lifted to first order."""
     return _carleman(mean, cov, capacity, "first_order")
 
 
@@ -85,7 +85,7 @@ class RunSettings:
         return np.diag([self.start_sigma_position, self.start_sigma_position, self.start_sigma_heading]) ** 2
 
 
-class Seen(NamedTuple):
+class SeenLandmarks(NamedTuple):
     """Every sighting of a landmark already in the map, in order.
 
     Attributes
@@ -127,7 +127,7 @@ class LogRun(NamedTuple):
         Their covariances.
     map : MapEstimate
         Batch of one.
-    seen : Seen
+    seen : SeenLandmarks
     """
 
     filter: str
@@ -135,7 +135,7 @@ class LogRun(NamedTuple):
     T_run_vehicle: Array
     covs: Array
     map: MapEstimate
-    seen: Seen
+    seen: SeenLandmarks
 
     @property
     def rejected(self) -> int:
@@ -162,7 +162,7 @@ def record_times(log: SlamLog, settings: RunSettings) -> Array:
 
 def run_log(
     log: SlamLog,
-    calibration: Calibration,
+    calibration: RobotCalibration,
     filter: str | Build,
     settings: RunSettings | None = None,
 ) -> LogRun:
@@ -171,7 +171,7 @@ def run_log(
     Parameters
     ----------
     log : SlamLog
-    calibration : Calibration
+    calibration : RobotCalibration
     filter : str or callable
         A name of :data:`FILTERS`, or a function that builds a filter like those.
     settings : RunSettings, optional
@@ -196,7 +196,7 @@ def run_log(
     return LogRun(name, line.times[line.record_at], poses, covs, runner.filter.landmarks(), runner.seen())
 
 
-def _drive(runner: _Runner, log: SlamLog, calibration: Calibration, line: Timeline) -> None:
+def _drive(runner: _Runner, log: SlamLog, calibration: RobotCalibration, line: Timeline) -> None:
     """Walk through the cuts: sightings before records, then the step to the next cut."""
     ds, dalpha, cov = line.increments[:, :1], line.increments[:, 1:], line.cov[:, None]
     sightings, records = line.sighting_at.tolist(), line.record_at.tolist()
@@ -232,10 +232,10 @@ class _Runner:
             passed = bool(y @ np.linalg.solve(S, y) <= self.gate)
             self._seen.append((time, identity, polar, y, S, passed))
 
-    def seen(self) -> Seen:
+    def seen(self) -> SeenLandmarks:
         """Everything seen, as arrays."""
         columns = list(zip(*self._seen, strict=True)) if self._seen else [()] * 6
         shapes = [(-1,), (-1,), (-1, 2), (-1, 2), (-1, 2, 2), (-1,)]
         kinds = [float, np.int64, float, float, float, bool]
         arrays = [np.array(c, dtype=k).reshape(s) for c, k, s in zip(columns, kinds, shapes, strict=True)]
-        return Seen(*arrays)
+        return SeenLandmarks(*arrays)

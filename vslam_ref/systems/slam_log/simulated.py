@@ -1,6 +1,6 @@
 """What a robot with given gains, offsets and noises would have logged in a world with exact truth.
 
-The inverse of what the filters take a :class:`Calibration` for: a filter that runs with the same values
+The inverse of what the filters take a :class:`RobotCalibration` for: a filter that runs with the same values
 is consistent by construction.
 """
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.systems.slam_log.calibration import Calibration
-from vslam_ref.systems.slam_log.log import Sighting, SlamLog, Truth
+from vslam_ref.systems.slam_log.calibration import RobotCalibration
+from vslam_ref.systems.slam_log.log import LoggedSighting, LogTruth, SlamLog
 from vslam_ref.systems.slam_log.timeline import increment_variances
 from vslam_ref.worlds.figure_eight import Eight
 
@@ -21,16 +21,16 @@ FIRST_LANDMARK = 6
 
 def log(
     world: Eight,
-    calibration: Calibration,
+    calibration: RobotCalibration,
     rng: np.random.Generator | None = None,
     clock_start: float = 1000.0,
-) -> tuple[SlamLog, Truth]:
+) -> tuple[SlamLog, LogTruth]:
     """Log and truth of a drive.
 
     Parameters
     ----------
     world : Eight
-    calibration : Calibration
+    calibration : RobotCalibration
         Gains and offsets that the log has, and its noises.
     rng : Generator, optional
         None: no noise; gains and offsets stay.
@@ -41,7 +41,7 @@ def log(
     -------
     log : SlamLog
         Sightings whose stamp lies behind the log's end are left out.
-    truth : Truth
+    truth : LogTruth
     """
     increments = world.controls * world.config.dt
     if rng is not None:
@@ -58,16 +58,16 @@ def log(
         dropped={},
     )
     ids = FIRST_LANDMARK + np.arange(len(world.landmarks))
-    truth = Truth(world.times, world.poses, 0.25, ids, world.landmarks, np.zeros(2), exact=True)
+    truth = LogTruth(world.times, world.poses, 0.25, ids, world.landmarks, np.zeros(2), exact=True)
     return logged, truth
 
 
-def logged_increments(increments: ArrayLike, calibration: Calibration) -> Array:
+def logged_increments(increments: ArrayLike, calibration: RobotCalibration) -> Array:
     """Increments (T, 2) as wheels report them, of ds (m) and dalpha (rad) that a filter shall take for true.
 
     Examples
     --------
-    >>> logged_increments([[0.5, 0.1]], Calibration(distance_gain=0.5, turn_gain=2.0, drift=0.2))
+    >>> logged_increments([[0.5, 0.1]], RobotCalibration(distance_gain=0.5, turn_gain=2.0, drift=0.2))
     array([[1., 0.]])
     """
     ds, dalpha = np.asarray(increments, dtype=np.float64).T
@@ -75,7 +75,7 @@ def logged_increments(increments: ArrayLike, calibration: Calibration) -> Array:
     return np.stack([ds / calibration.distance_gain, turn], axis=-1)
 
 
-def logged_polar(polar: ArrayLike, calibration: Calibration) -> Array:
+def logged_polar(polar: ArrayLike, calibration: RobotCalibration) -> Array:
     """Ranges (m) and bearings (rad), shape (m, 2), as a sensor logs them: ``Calibration.correct`` undone."""
     r, b = np.asarray(polar, dtype=np.float64).T
     logged = r * np.cos(b) ** calibration.range_cosine - calibration.range_offset
@@ -83,8 +83,8 @@ def logged_polar(polar: ArrayLike, calibration: Calibration) -> Array:
 
 
 def _sightings(
-    world: Eight, calibration: Calibration, rng: np.random.Generator | None
-) -> tuple[Sighting, ...]:
+    world: Eight, calibration: RobotCalibration, rng: np.random.Generator | None
+) -> tuple[LoggedSighting, ...]:
     found = []
     sigma = np.array([calibration.sigma_range, calibration.sigma_bearing])
     for step in range(0, len(world.times), world.config.steps_between_sightings):
@@ -93,5 +93,5 @@ def _sightings(
         if rng is not None:
             polar = polar + sigma * rng.standard_normal(polar.shape)
         if len(ids) and stamp <= world.times[-1]:
-            found.append(Sighting(stamp, FIRST_LANDMARK + ids, logged_polar(polar, calibration)))
+            found.append(LoggedSighting(stamp, FIRST_LANDMARK + ids, logged_polar(polar, calibration)))
     return tuple(found)

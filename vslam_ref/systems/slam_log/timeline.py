@@ -18,7 +18,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import vehicle
-from vslam_ref.systems.slam_log.calibration import Calibration
+from vslam_ref.systems.slam_log.calibration import RobotCalibration
 from vslam_ref.systems.slam_log.log import SlamLog
 
 
@@ -33,7 +33,7 @@ class Timeline(NamedTuple):
         ds (m) and dalpha (rad) of each step.
     cov : ndarray, shape (K, 2, 2)
         Their covariances.
-    sighting_at, record_at : ndarray of int
+    sighting_at, record_at : ndarray of int, shapes (S,), (R,)
         Index of the cut at which each sighting was taken, and each record is to be made.
     """
 
@@ -44,8 +44,8 @@ class Timeline(NamedTuple):
     record_at: IntArray
 
 
-def control_increments(log: SlamLog, calibration: Calibration) -> Array:
-    """Calibrated ds and dalpha of each control interval, shape (T - 1, 2).
+def control_increments(log: SlamLog, calibration: RobotCalibration) -> Array:
+    """Calibrated ds (metres) and dalpha (radians) of each control interval, shape (T - 1, 2).
 
     Implements :eq:`eq-b4` (B4) for an Ackermann log.
     """
@@ -59,14 +59,14 @@ def control_increments(log: SlamLog, calibration: Calibration) -> Array:
     return np.stack([ds, calibration.turn_gain * raw[:, 1] + calibration.drift * ds], -1)
 
 
-def increment_variances(increments: Array, calibration: Calibration) -> Array:
-    """Variances of increments; see :class:`Calibration`.
+def increment_variances(increments: Array, calibration: RobotCalibration) -> Array:
+    """Variances of increments; see :class:`RobotCalibration`.
 
     Parameters
     ----------
     increments : ndarray, shape (..., 2)
         ds (m) and dalpha (rad).
-    calibration : Calibration
+    calibration : RobotCalibration
 
     Returns
     -------
@@ -79,21 +79,21 @@ def increment_variances(increments: Array, calibration: Calibration) -> Array:
     return np.stack([distance, heading], -1)
 
 
-def sighting_times(log: SlamLog, calibration: Calibration) -> Array:
-    """When each sighting was taken, held inside the log, shape (S,)."""
+def sighting_times(log: SlamLog, calibration: RobotCalibration) -> Array:
+    """When each sighting was taken, seconds, held inside the log, shape (S,)."""
     taken = np.array([s.time for s in log.sightings]) - calibration.sighting_delay
     return np.clip(taken, log.times[0], log.times[-1])
 
 
 def build_timeline(
-    log: SlamLog, calibration: Calibration, record_times: Array, max_step: float = 0.0
+    log: SlamLog, calibration: RobotCalibration, record_times: Array, max_step: float = 0.0
 ) -> Timeline:
     """Cut the log at its sightings and at ``record_times``.
 
     Parameters
     ----------
     log : SlamLog
-    calibration : Calibration
+    calibration : RobotCalibration
     record_times : ndarray, shape (R,)
         Inside the log, seconds.
     max_step : float

@@ -33,7 +33,7 @@ class Cells(NamedTuple):
 
 
 class Covered(NamedTuple):
-    """Cells met by segments: number of the segment, row and column, each (k,), in order along it."""
+    """Cells met by segments: number ``segment (k,)``, ``row (k,)``, ``column (k,)``; no unit.  In order."""
 
     segment: IntArray
     row: IntArray
@@ -41,7 +41,7 @@ class Covered(NamedTuple):
 
 
 def checked_cells(cells: Cells) -> Cells:
-    """Return the raster; ``ValueError`` if it is none."""
+    """Return the raster; ``ValueError`` if it is not a valid one."""
     (x, y), r, shape = cells
     if not (np.isfinite([x, y, r]).all() and r > 0 and len(shape) == 2 and min(shape) >= 1):
         raise ValueError(
@@ -105,7 +105,7 @@ def _crossings(a: Array, d: Array) -> Array:
 
 
 def segment_cells(cells: Cells, segments: ArrayLike) -> BoolArray:
-    """Raster of the cells that any of the segments (m, 4) crosses."""
+    """Raster of the cells that any of the segments (m, 4), metres, crosses."""
     s = np.asarray(segments, dtype=np.float64).reshape(-1, 4)
     raster = np.zeros(cells.shape, dtype=bool)
     met = cells_on_segments(cells, s[:, :2], s[:, 2:])

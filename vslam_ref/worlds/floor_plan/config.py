@@ -1,4 +1,4 @@
-"""Every number of the floor plan's world, with its reason."""
+"""Every number of the floor plan's world, with its unit (metres, radians, seconds) and its reason."""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ The force is Helbing and Molnar's (Phys. Rev. E 51, 1995) in its circular form::
 
 After each step bodies that overlap are pushed apart, bodies that stand in the robot's disc or too near to
 a wall are pushed out, and a move through a wall is taken back.
+
+Places are in metres, velocities in m/s, times in seconds.
 """
 
 from __future__ import annotations

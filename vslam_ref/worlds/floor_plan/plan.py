@@ -134,14 +134,14 @@ class FloorPlan:
     ----------
     walls : ndarray, shape (m, 4)
         Segments, metres.
+    zones : ndarray, shape (z, 4)
+        Rectangles ``(xmin, ymin, xmax, ymax)`` where people walk; zone 0 is the one that the gates lead to.
+    route : ndarray, shape (k, 2)
+        Where the robot goes, from point to point.
     furniture, things : tuple of Box
         What never moves, and what is moved.
     doors : tuple of Door
-    zones : ndarray, shape (z, 4)
-        Rectangles ``(xmin, ymin, xmax, ymax)`` where people walk; zone 0 is the one that the gates lead to.
     gates : tuple of Gate
-    route : ndarray, shape (k, 2)
-        Where the robot goes, from point to point.
     """
 
     walls: Array
@@ -194,6 +194,18 @@ def _swing(*steps: tuple[float, float]) -> Schedule:
     return schedule(times, values)
 
 
+def _office_furniture() -> tuple[Box, ...]:
+    return (
+        standing(5.05, 0.65, 6.25, 1.45), standing(0.05, 3.25, 0.65, 4.05),  # A: table, cupboard
+        standing(8.05, 1.25, 9.25, 2.05), standing(13.25, 2.05, 14.05, 3.25),  # B
+        standing(0.65, 8.25, 1.85, 9.05), standing(4.05, 9.45, 4.65, 10.05),  # C
+        standing(5.05, 8.85, 6.25, 9.65), standing(8.45, 8.45, 9.45, 9.05),  # D
+        standing(11.05, 8.45, 12.25, 9.25),  # E
+        standing(5.35, 4.05, 5.65, 4.35), standing(8.75, 5.75, 9.05, 6.05),
+        standing(13.05, 4.05, 13.35, 4.35),
+    )  # fmt: skip
+
+
 def office() -> FloorPlan:
     """Five rooms and a corridor, 14 m by 10 m, with doors that open and close and a chair that is carried."""
     quarter = np.pi / 2
@@ -212,15 +224,7 @@ def office() -> FloorPlan:
         Door((6.55, 6.05), (7.55, 6.05), _swing((0.0, quarter))),
         Door((12.05, 6.05), (11.05, 6.05), _swing((0.0, 0.0), (22.0, -quarter))),
     )
-    furniture = (
-        standing(5.05, 0.65, 6.25, 1.45), standing(0.05, 3.25, 0.65, 4.05),  # A: table, cupboard
-        standing(8.05, 1.25, 9.25, 2.05), standing(13.25, 2.05, 14.05, 3.25),  # B
-        standing(0.65, 8.25, 1.85, 9.05), standing(4.05, 9.45, 4.65, 10.05),  # C
-        standing(5.05, 8.85, 6.25, 9.65), standing(8.45, 8.45, 9.45, 9.05),  # D
-        standing(11.05, 8.45, 12.25, 9.25),  # E
-        standing(5.35, 4.05, 5.65, 4.35), standing(8.75, 5.75, 9.05, 6.05),
-        standing(13.05, 4.05, 13.35, 4.35),
-    )  # fmt: skip
+    furniture = _office_furniture()
     chair = Box((0.4, 0.4), schedule([2.5, 6.5], [[5.65, 3.05, 0.0], [1.85, 3.05, 0.0]]))
     zones = np.array(
         [

@@ -125,7 +125,10 @@ def disc_ranges(origin: ArrayLike, angles: ArrayLike, discs: ArrayLike) -> Array
 
 
 def cast(origin: ArrayLike, angles: ArrayLike, segments: ArrayLike, discs: ArrayLike) -> Hits:
-    """First thing that each ray meets, among segments and discs; shapes as in the two functions above.
+    """First thing that each ray meets, among segments and discs.
+
+    ``origin (2,)``, ``angles (n,)``, ``segments (m, 4)``, ``discs (k, 3)`` as for :func:`segment_ranges` and
+    :func:`disc_ranges`; metres and radians.
 
     Examples
     --------

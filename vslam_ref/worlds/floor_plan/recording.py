@@ -38,6 +38,7 @@ class Surfaces(NamedTuple):
     Attributes
     ----------
     segments, discs : ndarray, shapes (m, 4), (k, 3)
+        Ends (x, y, x, y) and middle with radius, metres.
     segment_owner, disc_owner : ndarray of int, shapes (m,), (k,)
         Number of the object: 0 fixed, then doors, then things, then people.
     """
@@ -127,7 +128,7 @@ class Recording:
 
     @property
     def share_on_people(self) -> float:
-        """Share of the beams that end on a person, of those that end on anything."""
+        """Share of the beams that end on a person, of those that end on a surface."""
         first = 1 + len(self.plan.doors) + len(self.plan.things)
         return float(np.mean(self.owner[self.owner >= 0] >= first))
 

@@ -1,4 +1,7 @@
-"""The robot's way: from point to point, turning on the spot, and what its wheels report of it."""
+"""The robot's way: from point to point, turning on the spot, and what its wheels report of it.
+
+Poses (x, y, theta) and increments (ds, dalpha) are in metres and radians.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +64,7 @@ def _steps(amount: float, most: float, axis: int) -> Array:
 
 
 def drive(start: ArrayLike, increments: ArrayLike) -> Array:
-    """Poses (n + 1, 3) from a start pose by increments (n, 2)."""
+    """Poses (n + 1, 3) from a start pose (3,) by increments (n, 2)."""
     T_world_robot = [np.asarray(start, dtype=np.float64)]
     for increment in np.asarray(increments, dtype=np.float64):
         T_world_robot.append(vehicle.propagate(T_world_robot[-1], increment))

@@ -1,4 +1,4 @@
-"""Truth for cells: who covers each one at a scan, and which the laser could see."""
+"""Truth for cells: who covers each one at a scan, and which the laser could see.  Lengths are in metres."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class CellTruth(NamedTuple):
 
     Attributes
     ----------
-    static : ndarray of bool
+    static : ndarray of bool, shape (rows, columns)
         Covered by the outline of something whose pose did not change within the last T seconds.
-    moving : ndarray of bool
+    moving : ndarray of bool, shape (rows, columns)
         Covered now by something whose pose did change within the last T seconds.
     """
 
@@ -32,9 +32,9 @@ class Seen(NamedTuple):
 
     Attributes
     ----------
-    crossed : ndarray of bool
+    crossed : ndarray of bool, shape (rows, columns)
         A beam went through the cell and ended in another one, or at the maximum range.
-    ended : ndarray of bool
+    ended : ndarray of bool, shape (rows, columns)
         A beam ended in the cell, on something.
     """
 
