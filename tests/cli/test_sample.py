@@ -119,8 +119,8 @@ def test_run_beats_dead_reckoning(samples: Path, tmp_path: Path) -> None:
     found = run_json(tmp_path, "run", "iekf-slam", samples / "robot", "--out", tmp_path / "out")
     log = mrclam.read_log(samples / "robot", 1)
     true = mrclam.read_truth(samples / "robot", 1, log)
-    wheels = drive(true.poses[0], control_increments(log, noise.calibration("mrclam")))
-    rmse = np.sqrt(np.mean(np.sum((wheels - true.poses)[:, :2] ** 2, axis=1)))
+    wheels = drive(true.T_world_vehicle[0], control_increments(log, noise.calibration("mrclam")))
+    rmse = np.sqrt(np.mean(np.sum((wheels - true.T_world_vehicle)[:, :2] ** 2, axis=1)))
     assert found["landmarks"] == truth(samples, "robot")["landmarks"]
     for name in ("ekf", "iekf", "ekf-anchored"):
         assert found["filters"][name]["rmse_position_unaligned_m"] < rmse / 3, name

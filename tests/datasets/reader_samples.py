@@ -67,7 +67,7 @@ def reader(name: str) -> Callable[..., Any]:
 
 MAY_BE_NAN = {
     ("SlamLog", "wheelbase"): "a differential drive has none",
-    ("Truth", "poses"): "the GPS knows no heading",
+    ("LogTruth", "T_world_vehicle"): "the GPS knows no heading",
     ("CarmenLog", "ranges"): "the maps count readings that are none",
 }
 

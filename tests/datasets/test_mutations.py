@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import damage
 import fuzz_readers
-import mutation
 import numpy as np
 import pytest
 from fuzz_readers import damage, fuzz, judge, message_wrong, scratch
@@ -200,7 +200,7 @@ def test_a_file_is_made_from_its_number_alone() -> None:
 
 def test_every_step_works_on_every_file() -> None:
     rng = np.random.default_rng(0)
-    for step in mutation.STEPS.values():
+    for step in damage.STEPS.values():
         for data in (b"", b"\n", b"x", b"1 2 3\n4 5 6\n", bytes(range(256))):
             for _ in range(20):
                 assert isinstance(step(data, rng), bytes)
