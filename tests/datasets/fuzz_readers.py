@@ -30,7 +30,7 @@ from types import FrameType
 from typing import NoReturn
 
 import numpy as np
-from damage import mutate
+from damaging import mutate
 from reader_samples import SAMPLES, Sample, reader
 
 from vslam_ref.datasets.text import FormatError

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-import damage
+import damaging
 import fuzz_readers
 import numpy as np
 import pytest
@@ -200,7 +200,7 @@ def test_a_file_is_made_from_its_number_alone() -> None:
 
 def test_every_step_works_on_every_file() -> None:
     rng = np.random.default_rng(0)
-    for step in damage.STEPS.values():
+    for step in damaging.STEPS.values():
         for data in (b"", b"\n", b"x", b"1 2 3\n4 5 6\n", bytes(range(256))):
             for _ in range(20):
                 assert isinstance(step(data, rng), bytes)
