@@ -1,0 +1,171 @@
+r"""A camera's pose from one picture to the next: Tukey's loss, reweighted, a fixed number of steps.
+
+The start is near: the prediction of a motion model.  So a plain Gauss-Newton loop does, without damping and
+without a test for the end.  In every step the scale is taken anew from the median of the errors, the weights
+from the scale, and the step :math:`\mu` from
+
+.. math:: \sum_j w_j\, \frac{J_j^T J_j}{\sigma_j^2}\; \mu
+   = -\sum_j w_j\, \frac{J_j^T e_j}{\sigma_j^2}, \qquad T \leftarrow \operatorname{Exp}(\mu)\, T ,
+
+with e predicted minus measured.  It minimises :math:`\sum_j \rho(\lVert e_j \rVert / (\sigma \sigma_j))` over one
+pose, :func:`vslam_ref.estimation.resection.refine_pose` with a scale that follows the errors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.arrays import Array, BoolArray, as_array
+from vslam_ref.estimation.robust import L2, Loss, norm_scale, tuned
+from vslam_ref.geometry import se3
+from vslam_ref.geometry.cameras import Camera
+
+STEPS = 10
+LEAST_SIGMA = 0.4
+"""Pixels of a level; the scale is never less.  PTAM's."""
+
+
+class TrackedPose(NamedTuple):
+    """A pose and how well the measurements agree with it.
+
+    Attributes
+    ----------
+    T_cam_world : ndarray, shape (4, 4)
+        The start, where ``reason`` is not empty.
+    weights : ndarray, shape (N,)
+        Of Tukey's loss; 0 for what does not belong there, or lies behind the camera.
+    sigma : float
+        Scale of the errors in one coordinate, in units of ``sigma_px``.
+    cov_pose : ndarray, shape (6, 6)
+        Of the left perturbation (rho, phi), to first order.
+    reason : str
+        Empty, or why there is no pose.
+    """
+
+    T_cam_world: Array
+    weights: Array
+    sigma: float
+    cov_pose: Array
+    reason: str
+
+    @property
+    def inliers(self) -> BoolArray:
+        """Measurements (N,) with any weight."""
+        return np.asarray(self.weights > 0)
+
+
+def track_pose(
+    camera: Camera,
+    X_world: ArrayLike,
+    uv: ArrayLike,
+    T_start: ArrayLike,
+    *,
+    sigma_px: ArrayLike = 1.0,
+    loss: Loss | None = None,
+    steps: int = STEPS,
+    least_sigma: float = LEAST_SIGMA,
+) -> TrackedPose:
+    """Pose near a start by iterated reweighted least squares.
+
+    Implements :eq:`eq-a2-6` (A2.6), with the error of :eq:`eq-a2-7` (A2.7), its sign turned.
+
+    Parameters
+    ----------
+    camera : Camera
+        Any lens.
+    X_world : array_like, shape (N, 3)
+        Points.
+    uv : array_like, shape (N, 2)
+        Where they were found, pixels.
+    T_start : array_like, shape (4, 4)
+    sigma_px : array_like, broadcast to (N,)
+        Standard deviation of a coordinate up to a common factor: 2^level.
+    loss : Loss, optional
+        For norms in units of the scale; Tukey's with its 95 % constant by default, ``L2()`` for least squares.
+    steps : int
+    least_sigma : float
+        In units of ``sigma_px``.
+
+    Returns
+    -------
+    TrackedPose
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, or a ``sigma_px`` is not positive.
+
+    Examples
+    --------
+    >>> from vslam_ref.geometry.cameras import Pinhole
+    >>> camera = Pinhole(500, 500, 320, 240)
+    >>> X = np.array([[x, y, 4 + (x - y) ** 2] for x in (-1.0, 0, 1) for y in (-1.0, 0, 1)])
+    >>> uv = camera.project(X).uv
+    >>> uv[0] += [80.0, 0.0]  # a wrong match
+    >>> found = track_pose(camera, X, uv, se3.exp([0.01, 0, 0.02, 0, 0.01, 0]))
+    >>> bool(np.abs(found.T_cam_world - np.eye(4)).max() < 1e-6), found.inliers.sum().item()
+    (True, 8)
+    """
+    X, u, T = as_array("X_world", X_world, 3), as_array("uv", uv, 2), as_array("T_start", T_start, 4, 4)
+    if X.ndim != 2 or u.shape != (len(X), 2):
+        raise ValueError(f"X_world {X.shape} and uv {u.shape}: need (N, 3) and (N, 2)")
+    root = 1.0 / np.broadcast_to(np.asarray(sigma_px, np.float64), (len(X),))
+    if not (np.isfinite(root) & (root > 0)).all():
+        raise ValueError("sigma_px must be finite and more than 0")
+    rho = tuned("tukey", 2) if loss is None else loss
+    for _ in range(steps):
+        at = _weighed(camera, X, u, root, T, rho, least_sigma)
+        if at.reason:
+            return TrackedPose(T, at.weights, at.sigma, np.diag(np.full(6, np.inf)), at.reason)
+        mu = -np.linalg.solve(at.H, at.g)
+        T = se3.perturb(T, mu)
+    end = _weighed(camera, X, u, root, T, rho, least_sigma)
+    if end.reason:
+        return TrackedPose(T, end.weights, end.sigma, np.diag(np.full(6, np.inf)), end.reason)
+    return TrackedPose(T, end.weights, end.sigma, end.sigma**2 * np.linalg.inv(end.H), "")
+
+
+class _Weighed(NamedTuple):
+    """Normal equations H (6, 6), g (6,) at a pose, weights (N,), scale."""
+
+    H: Array
+    g: Array
+    weights: Array
+    sigma: float
+    reason: str
+
+
+LEAST_POINTS = 4
+"""Fewer measurements with weight leave no redundancy worth the name."""
+WORST = 1e12
+"""Condition of the scaled normal matrix beyond which the pose is not determined."""
+
+
+def _weighed(
+    camera: Camera, X: Array, u: Array, root: Array, T: Array, loss: Loss, least_sigma: float
+) -> _Weighed:
+    """Errors, scale, weights and normal equations at a pose."""
+    at = camera.pixel_from_world_with_jacobians(T, X)
+    e = np.where(at.valid[:, None], (at.uv - u) * root[:, None], 0.0)
+    sigma = max(norm_scale(e[at.valid]).sigma, least_sigma) if at.valid.any() else np.inf
+    size = np.hypot(e[:, 0], e[:, 1])
+    scaled = loss if isinstance(loss, L2) or not np.isfinite(sigma) else loss.scaled(sigma)
+    w = np.where(at.valid, scaled.weight(size), 0.0)
+    J = at.J_pose * root[:, None, None]
+    Jw = (J * w[:, None, None]).reshape(-1, 6)
+    H = Jw.T @ J.reshape(-1, 6)  # eq-track-normal
+    g = Jw.T @ e.ravel()
+    return _Weighed(H, g, w, sigma, _trouble(H, w))
+
+
+def _trouble(H: Array, w: Array) -> str:
+    """Why normal equations have no answer, or nothing."""
+    if np.count_nonzero(w) < LEAST_POINTS:
+        return f"{np.count_nonzero(w)} measurements agree: a pose needs at least {LEAST_POINTS}"
+    d = np.sqrt(np.diag(H))
+    if not (d > 0).all() or np.linalg.cond(H / d[:, None] / d) > WORST:
+        return "the points do not determine the pose"
+    return ""

@@ -1,0 +1,36 @@
+"""A picture made ready: pyramid, corners of every level, small image."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features import corner_score, detect, is_peak, pyramid, shi_tomasi, small_image
+from vslam_ref.features.corners import HALF
+from vslam_ref.features.small_image import LEAST_SIDE
+from vslam_ref.systems.ptam.settings import FeatureSettings
+from vslam_ref.systems.visual_map import Picture
+
+
+def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Picture:
+    """Make a picture (H, W) of 8 bits ready to be looked at."""
+    levels = pyramid(grey, settings.levels)
+    limit = [settings.threshold_finest] + [settings.threshold] * (settings.levels - 1)
+    corners = tuple(detect(image, t, settings.arc) for image, t in zip(levels, limit, strict=True))
+    coarse = max(l for l, image in enumerate(levels) if l == 0 or min(image.shape) >= LEAST_SIDE)
+    return Picture(number, levels, corners, small_image(levels[coarse], coarse))
+
+
+def strong_corners(picture: Picture, level: int, settings: FeatureSettings, most: int) -> IntArray:
+    """Numbers of a level's corners that are peaks and strong, strongest first, at most ``most``."""
+    image, corners = picture.levels[level], picture.corners[level]
+    peak = is_peak(corners, corner_score(image, corners.xy, settings.arc))
+    height, width = image.shape
+    reach = HALF + 2
+    inner = (corners.xy >= reach).all(1) & (corners.xy < (width - reach, height - reach)).all(1)
+    number = np.flatnonzero(peak & inner)
+    strength: Array = shi_tomasi(image, corners.xy[number])
+    order = np.argsort(-strength, kind="stable")
+    order = order[strength[order] >= settings.least_eigenvalue]
+    return number[order[:most]]

@@ -1,0 +1,139 @@
+r"""Corners of another picture on the curve along which a point may appear, compared with its patch.
+
+The ray of a corner, seen by another camera, is a line; with a lens it appears as a curve.  For a corner with
+the bearing b there, :math:`e = b^T E a` vanishes on the curve, and
+
+.. math:: d = |e| \,/\, \lVert \partial e / \partial u \rVert
+
+is its distance in pixels, to first order: no curve is drawn.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.features import finest_from_level, level_sigma, zmssd
+from vslam_ref.features.search import AREA, variation
+from vslam_ref.features.templates import cut
+from vslam_ref.geometry import se3, so3
+from vslam_ref.geometry.cameras import Camera
+from vslam_ref.systems.visual_map.visual_map import Bytes
+
+PORTION = 4096
+"""Pairs of patches that are compared together."""
+
+
+class Corner(NamedTuple):
+    """Whole pixels of a level (n, 2), their bearings (n, 3) and d bearing / d pixel of level 0 (n, 3, 2)."""
+
+    xy: IntArray
+    bearing: Array
+    J_pixel: Array
+    valid: BoolArray
+
+    def only(self, rows: IntArray) -> Corner:
+        """Return some of them."""
+        return Corner(*(values[rows] for values in self))
+
+
+class OnCurve(NamedTuple):
+    """Best corner of each point (n,), -1 without one, and its cost over the patch's variation."""
+
+    corner: IntArray
+    cost: Array
+
+
+def with_bearings(camera: Camera, xy: IntArray, level: int) -> Corner:
+    """Give corners of a level their rays."""
+    ray = camera.unproject_with_jacobians(finest_from_level(xy, level))
+    return Corner(xy, ray.bearing, ray.J_pixel, ray.valid)
+
+
+def essential(T_b_a: Array) -> Array:
+    """E (3, 3) with b^T E a = 0 for bearings of one point."""
+    return so3.hat(se3.translation(T_b_a)) @ se3.rotation(T_b_a)
+
+
+def search_curve(
+    patch: Bytes,
+    a: Corner,
+    image: Bytes,
+    b: Corner,
+    T_b_a: Array,
+    *,
+    level: int,
+    near: float,
+    distance: float,
+    limit: float,
+) -> OnCurve:
+    """Find for each patch the corner near its curve that looks most like it.
+
+    Implements :eq:`eq-curve-distance`.
+
+    Parameters
+    ----------
+    patch : ndarray of uint8, shape (n, 8, 8)
+        Around the corners ``a``.
+    a : Corner
+        n corners of the first picture.
+    image : ndarray of uint8, shape (H, W)
+        The level of the second picture.
+    b : Corner
+        m corners of it.
+    T_b_a : ndarray, shape (4, 4)
+    level : int
+    near : float
+        Least depth in the first camera.
+    distance : float
+        Pixels of the level, from the curve.
+    limit : float
+        Largest ZMSSD as a share of the patch's variation.
+
+    Returns
+    -------
+    OnCurve
+    """
+    best = OnCurve(np.full(len(a.xy), -1), np.full(len(a.xy), np.inf))
+    if len(a.xy) == 0 or len(b.xy) == 0:
+        return best
+    row, column = _near_curve(a, b, T_b_a, distance * float(level_sigma(level)), near)
+    there = cut(image, b.xy)
+    use = there.inside[column]
+    row, column = row[use], column[use]
+    cost = np.empty(len(row))
+    flat = patch.reshape(-1, AREA), there.patch.reshape(-1, AREA)
+    for low in range(0, len(row), PORTION):
+        part = slice(low, low + PORTION)
+        cost[part] = zmssd(flat[0][row[part]], flat[1][column[part]])
+    cost /= np.maximum(variation(patch), 1.0)[row]
+    order = np.lexsort((column, cost, row))
+    rows, first = np.unique(row[order], return_index=True)
+    winner = order[first]
+    best.cost[rows] = cost[winner]
+    best.corner[rows] = np.where(cost[winner] <= limit, column[winner], -1)
+    return best
+
+
+def _near_curve(a: Corner, b: Corner, T_b_a: Array, distance: float, near: float) -> tuple[IntArray, IntArray]:
+    """Pairs (p,) of a point and a corner near its curve, in front of both cameras and not too close."""
+    lines = a.bearing @ essential(T_b_a).T  # (n, 3): E a
+    e = lines @ b.bearing.T
+    gx, gy = lines @ b.J_pixel[:, :, 0].T, lines @ b.J_pixel[:, :, 1].T
+    close = (e * e <= distance**2 * (gx * gx + gy * gy)) & a.valid[:, None] & b.valid  # eq-curve-distance
+    row, column = np.nonzero(close)
+    depth = ray_depths(a.bearing[row], b.bearing[column], T_b_a)
+    good = (depth[:, 0] >= near) & (depth[:, 1] > 0)
+    return row[good], column[good]
+
+
+def ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
+    """Distances (n, 2) along both rays of where they come closest; infinite, with a sign, if parallel."""
+    ra = a @ se3.rotation(T_b_a).T
+    t = se3.translation(T_b_a)
+    c = np.einsum("ni,ni->n", ra, b)
+    p, q = ra @ t, b @ t
+    under = np.maximum(1.0 - c * c, 1e-12)
+    return np.stack([(c * q - p) / under, (q - c * p) / under], 1)

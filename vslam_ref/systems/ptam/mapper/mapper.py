@@ -1,0 +1,91 @@
+"""What happens to a keyframe: sightings in, look again, new points, neighbours, adjustment, culling."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.estimation.bundle import Options, Robust
+from vslam_ref.estimation.robust import tuned
+from vslam_ref.systems.ptam.mapper.associate import look_again, look_in_neighbours, seldom_found
+from vslam_ref.systems.ptam.mapper.new_points import new_points
+from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.visual_map import Adjusted, Looks, Picture, VisualMap, adjust, local_active, neighbours
+
+
+class Measurements(NamedTuple):
+    """What the tracker found in a picture: points (n,), pixels of level 0 (n, 2), levels (n,)."""
+
+    point: IntArray
+    uv: Array
+    level: IntArray
+
+
+class Mapped(NamedTuple):
+    """What a keyframe brought.
+
+    Attributes
+    ----------
+    kf : int
+        Its number.
+    again, new, elsewhere : int
+        Points found by looking again; new points; sightings of these in neighbours.
+    adjusted : tuple of Adjusted
+        Local, and global where it was due.
+    culled : int
+        Points that were found too seldom.
+    """
+
+    kf: int
+    again: int
+    new: int
+    elsewhere: int
+    adjusted: tuple[Adjusted, ...]
+    culled: int
+
+
+def map_keyframe(
+    visual_map: VisualMap, picture: Picture, T_cam_world: Array, seen: Measurements, settings: Settings
+) -> Mapped:
+    """Take a picture into the map as a keyframe, and make the map better by it."""
+    s, f = settings.mapper, settings.features
+    looks = Looks(f.limit, f.measure, f.absolute, f.first_refine)
+    kf = visual_map.add_keyframe(T_cam_world, picture)
+    held = visual_map.alive[seen.point]
+    visual_map.observe(kf, seen.point[held], seen.level[held], seen.uv[held])
+    alive = np.flatnonzero(visual_map.alive)
+    again = look_again(visual_map, kf, picture, alive, s.look_radius, looks)
+    fresh = new_points(visual_map, kf, picture, s, f)
+    around = neighbours(visual_map, kf, s.neighbours)
+    elsewhere = look_in_neighbours(visual_map, around, fresh, s.look_radius, looks)
+    adjusted = [adjust_local(visual_map, kf, settings)]
+    if kf % s.global_every == 0:
+        adjusted.append(adjust_all(visual_map, settings, s.global_steps))
+    bad = seldom_found(visual_map, s.tries, s.found)
+    visual_map.remove(bad)
+    return Mapped(kf, len(again), len(fresh), elsewhere, tuple(adjusted), len(bad))
+
+
+def adjust_local(visual_map: VisualMap, kf: int, settings: Settings) -> Adjusted:
+    """Move the newest keyframe and its neighbours, with the points they see."""
+    s = settings.mapper
+    active = local_active(visual_map, kf, s.local)
+    return adjust(visual_map, robust(settings), active=active, options=options(s.local_steps))
+
+
+def adjust_all(visual_map: VisualMap, settings: Settings, steps: int) -> Adjusted:
+    """Move everything but the first keyframe."""
+    return adjust(visual_map, robust(settings), options=options(steps))
+
+
+def robust(settings: Settings) -> Robust:
+    """Tukey's loss, its scale from the errors."""
+    t = settings.tracker
+    return Robust(tuned(t.loss, 2), "adaptive", t.least_sigma)
+
+
+def options(steps: int) -> Options:
+    """End where another step would not be seen in a pixel."""
+    return Options(cost=1e-4, scale=1e-2, max_iterations=steps)

@@ -1,0 +1,48 @@
+"""When does a picture become a keyframe?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vslam_ref.geometry import camera_pose
+from vslam_ref.systems.ptam.settings import KeyframeSettings
+from vslam_ref.systems.ptam.tracker.quality import Quality
+from vslam_ref.systems.ptam.tracker.tracker import Tracked
+from vslam_ref.systems.visual_map import VisualMap
+
+
+@dataclass
+class KeyframePolicy:
+    """Time, distance and quality, as A§2.2.2.1 says; and never starve the map."""
+
+    settings: KeyframeSettings
+    since: int = 0
+    best: int = 0
+
+    def wants(self, visual_map: VisualMap, tracked: Tracked) -> bool:
+        """Whether this picture, tracked now, shall be a keyframe; call it once for each picture."""
+        s = self.settings
+        self.since += 1
+        inliers = tracked.fine.inliers
+        self.best = max(self.best, inliers)
+        may = tracked.quality is not Quality.LOST and inliers >= s.least_inliers
+        if not may or tracked.pose.sigma > s.worst_sigma or self.since < s.gap:
+            return False
+        away = distance(visual_map, tracked)
+        few = inliers < s.fewer * self.best and away > s.distance
+        return bool(few or inliers < s.much_fewer * self.best or away > s.far)
+
+    def taken(self) -> None:
+        """Begin anew: this picture became a keyframe."""
+        self.since = self.best = 0
+
+
+def distance(visual_map: VisualMap, tracked: Tracked) -> float:
+    """Distance to the nearest keyframe over the median depth of the points that were seen."""
+    seen = tracked.fine.seen
+    depth = float(np.median(seen.depth[tracked.fine.weights > 0]))
+    centres = camera_pose.centre_from_pose(visual_map.T_kf_world)
+    away = np.linalg.norm(centres - camera_pose.centre_from_pose(tracked.T_cam_world), axis=1)
+    return float(away.min() / depth)

@@ -1,0 +1,189 @@
+"""The system: a picture in, a pose out, and a map that grows.
+
+::
+
+    picture -> prepare -> no map yet: trails -> attempt -> first map
+                       -> map: tracker -> pose, quality -> counters -> keyframe? -> mapper
+
+In this order, one after the other, on one thread: the same pictures and seed give the same bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.arrays import Array
+from vslam_ref.geometry import se3
+from vslam_ref.geometry.camera_pose import DecayingVelocity
+from vslam_ref.geometry.cameras import Camera
+from vslam_ref.systems.ptam import trails as trail_steps
+from vslam_ref.systems.ptam.look import prepare
+from vslam_ref.systems.ptam.mapper.mapper import Mapped, Measurements, adjust_all, map_keyframe
+from vslam_ref.systems.ptam.policy import KeyframePolicy
+from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
+from vslam_ref.systems.ptam.tracker.quality import Quality
+from vslam_ref.systems.ptam.tracker.tracker import Tracked, Tracker
+from vslam_ref.systems.visual_map import Picture, VisualMap
+
+
+class Pose(NamedTuple):
+    """Where a picture was taken, relative to a keyframe: ``T_cam_kf`` (4, 4); ``live`` as it was told then."""
+
+    number: int
+    kf: int
+    T_cam_kf: Array
+    live: Array | None
+
+
+class Outcome(NamedTuple):
+    """What became of one picture.
+
+    Attributes
+    ----------
+    number : int
+    tracked : Tracked or None
+        None before there is a map.
+    mapped : Mapped or None
+        If it became a keyframe.
+    attempt : Attempt or str or None
+        Of a start, if one was tried; a sentence where there was nothing to try.
+    """
+
+    number: int
+    tracked: Tracked | None = None
+    mapped: Mapped | None = None
+    attempt: Attempt | str | None = None
+
+
+@dataclass
+class Ptam:
+    """Parallel tracking and mapping, with mapping in line.
+
+    Parameters
+    ----------
+    camera : Camera
+    settings : Settings, optional
+    """
+
+    camera: Camera
+    settings: Settings = field(default_factory=Settings)
+
+    def __post_init__(self) -> None:
+        s = self.settings
+        self.rng = np.random.default_rng(s.seed)
+        self.map: VisualMap | None = None
+        self.trails: trail_steps.Trails | None = None
+        self.tracker: Tracker | None = None
+        self.policy = KeyframePolicy(s.keyframe)
+        self.poses: dict[int, Pose] = {}
+        self.started_at: tuple[int, int] | None = None
+
+    def step(self, number: int, grey: ArrayLike) -> Outcome:
+        """Take the next picture (H, W) of 8 bits."""
+        picture = prepare(number, grey, self.settings.features)
+        if self.map is None:
+            return self._before_the_map(picture)
+        return self._with_the_map(picture)
+
+    # --- before there is a map ----------------------------------------------------------------
+
+    def _before_the_map(self, picture: Picture) -> Outcome:
+        s, f = self.settings.start, self.settings.features
+        if self.trails is not None:
+            self.trails = trail_steps.go_on(self.trails, picture, s)
+        worn = self.trails is None or len(self.trails.now) < s.least_trails
+        if worn or len(self.trails.pictures) > s.patience:  # type: ignore[union-attr]
+            self.trails = trail_steps.begin(picture, s, f)
+            return Outcome(picture.number)
+        assert self.trails is not None
+        if self.trails.length < s.least_motion:
+            return Outcome(picture.number)
+        found = attempt(self.camera, self.trails, s, self.rng)
+        if not isinstance(found, str) and not found.reason:
+            self._start(found)
+        return Outcome(picture.number, attempt=found)
+
+    def _start(self, found: Attempt) -> None:
+        """Make the first map, and track the pictures between against it."""
+        assert self.trails is not None
+        pictures = self.trails.pictures
+        self.map = first_map(self.camera, self.trails, found, self.settings)
+        self.started_at = pictures[0].number, pictures[-1].number
+        T_last = self.map.T_kf_world[1].copy()
+        for kf, picture in ((0, pictures[0]), (1, pictures[-1])):
+            self.poses[picture.number] = Pose(picture.number, kf, np.eye(4), None)
+        back = self._tracker(T_last)
+        for picture in reversed(pictures[1:-1]):
+            tracked = back.track(self.map, picture)
+            if tracked.quality is not Quality.LOST:
+                self._note(picture, tracked, live=False)
+        self.tracker = self._tracker(T_last)
+        self.tracker.last = pictures[-1]
+        self.trails = None
+
+    def _tracker(self, T_last: Array) -> Tracker:
+        return Tracker(self.settings, self.rng, DecayingVelocity(np.zeros(6), 1.0, 1.0), T_last)
+
+    # --- with a map ---------------------------------------------------------------------------
+
+    def _with_the_map(self, picture: Picture) -> Outcome:
+        assert self.map is not None and self.tracker is not None
+        tracked = self.tracker.track(self.map, picture)
+        mapped = None
+        if tracked.quality is not Quality.LOST:
+            self._count(tracked)
+            self._note(picture, tracked, live=True)
+            if self.policy.wants(self.map, tracked):
+                mapped = self._keyframe(picture, tracked)
+        return Outcome(picture.number, tracked, mapped)
+
+    def _count(self, tracked: Tracked) -> None:
+        """Remember of each point that it was looked for, and whether it was found."""
+        assert self.map is not None
+        seen, points = tracked.fine.seen.point, self.map.points
+        points["tried"][seen] += 1
+        points["found"][seen[tracked.fine.weights > 0]] += 1
+
+    def _note(self, picture: Picture, tracked: Tracked, *, live: bool) -> None:
+        """Remember a pose relative to the keyframe nearest to it."""
+        assert self.map is not None
+        T = tracked.T_cam_world
+        centre = se3.translation(se3.inverse(T))
+        away = np.linalg.norm(se3.translation(se3.inverse(self.map.T_kf_world)) - centre, axis=1)
+        kf = int(np.argmin(away))
+        T_cam_kf = se3.compose(T, se3.inverse(self.map.T_kf_world[kf]))
+        self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
+
+    def _keyframe(self, picture: Picture, tracked: Tracked) -> Mapped:
+        assert self.map is not None and self.tracker is not None
+        held = tracked.fine.weights > 0
+        seen = tracked.fine.seen
+        measured = Measurements(seen.point[held], tracked.fine.uv[held], seen.level[held])
+        mapped = map_keyframe(self.map, picture, tracked.T_cam_world, measured, self.settings)
+        T = self.map.T_kf_world[mapped.kf].copy()
+        live = self.poses[picture.number].live
+        self.poses[picture.number] = Pose(picture.number, mapped.kf, np.eye(4), live)
+        self.tracker.T_last = T
+        self.policy.taken()
+        return mapped
+
+    # --- the end ------------------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Adjust everything once more."""
+        if self.map is not None:
+            adjust_all(self.map, self.settings, self.settings.last_steps)
+
+    def trajectory(self) -> tuple[Array, Array]:
+        """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""
+        if self.map is None:
+            return np.zeros(0, np.int64), np.zeros((0, 4, 4))
+        numbers = np.array(sorted(self.poses))
+        each = [self.poses[int(n)] for n in numbers]
+        T = np.stack([se3.compose(p.T_cam_kf, self.map.T_kf_world[p.kf]) for p in each])
+        return numbers, T

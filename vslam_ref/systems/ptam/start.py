@@ -1,0 +1,122 @@
+"""From two pictures to a first map, or the reason why not yet."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.estimation.relative_pose import estimate_motion
+from vslam_ref.estimation.triangulation import triangulate
+from vslam_ref.features import level_sigma
+from vslam_ref.geometry import se3
+from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.multiview import Views
+from vslam_ref.systems.ptam.mapper.mapper import adjust_all
+from vslam_ref.systems.ptam.mapper.new_points import new_points
+from vslam_ref.systems.ptam.settings import Settings, StartSettings
+from vslam_ref.systems.ptam.trails import Trails, from_the_first
+from vslam_ref.systems.visual_map import VisualMap
+
+
+class Attempt(NamedTuple):
+    """What two pictures told.
+
+    Attributes
+    ----------
+    T_b_a : ndarray, shape (4, 4)
+    uv_a, uv_b : ndarray, shape (n, 2)
+        Matches that were asked, pixels.
+    level : ndarray of int64, shape (n,)
+    good : ndarray of bool, shape (n,)
+        Those that agree, with depth.
+    X_a : ndarray, shape (n, 3)
+        Points in the first camera's frame; the base line is 1.
+    cost : float
+        Pixels squared per point.
+    rivals : tuple of (str, float)
+        Other answers and their costs.
+    parallax : float
+        Median, degrees.
+    reason : str
+        Empty if this is a start.
+    """
+
+    T_b_a: Array
+    uv_a: Array
+    uv_b: Array
+    level: Array
+    good: BoolArray
+    X_a: Array
+    cost: float
+    rivals: tuple[tuple[str, float], ...]
+    parallax: float
+    reason: str
+
+
+def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Generator) -> Attempt | str:
+    """Try to start from the first and the last picture of trails; a sentence if there is nothing to try."""
+    again = from_the_first(trails, s)
+    ok = np.isfinite(again[:, 0])
+    if ok.sum() < max(s.least_trails, 8):
+        return f"{ok.sum()} of {len(ok)} corners are still found: need {s.least_trails}"
+    uv_a, uv_b, level = trails.first[ok], again[ok], trails.level[ok]
+    a, b = camera.unproject(uv_a), camera.unproject(uv_b)
+    sigma = 1.0 / float(np.sqrt(camera.fx * camera.fy))
+    found = estimate_motion(a.xn, b.xn, rng, sigma=sigma)
+    return _judged(camera, found, uv_a, uv_b, level, s)
+
+
+def _judged(camera, found, uv_a, uv_b, level, s):  # type: ignore[no-untyped-def]
+    """Triangulate, and say what is missing for a start."""
+    T, choice = found.T_b_a, found.choice
+    cost, rivals = (choice.cost, choice.rivals) if choice is not None else (np.inf, ())
+    views = Views(camera, [se3.identity(), T])
+    points = triangulate(views, np.stack([uv_a, uv_b], 1), min_parallax=0.0, max_iterations=10)
+    small = points.rmse_px <= 3.0 * level_sigma(level)
+    good = found.inliers & points.ok & small
+    angle = np.degrees(points.parallax[found.inliers & small])
+    parallax = float(np.median(angle)) if len(angle) else 0.0
+    wide = int((angle >= s.wide_parallax).sum())
+    good &= np.degrees(points.parallax) >= 0.5 * s.parallax
+    depth = points.X_world[good, 2]
+    spread = float(np.percentile(depth, 90) / np.percentile(depth, 10)) if good.sum() > 10 else 1.0
+    reason = found.reason
+    if not reason and parallax < s.parallax:
+        reason = f"the rays of a point differ by {parallax:.2f} degrees: need {s.parallax:g}"
+    if not reason and wide < s.wide_points:
+        reason = f"{wide} points have {s.wide_parallax:g} degrees of parallax: need {s.wide_points}"
+    if not reason and cost > s.cost:
+        reason = f"the cost is {cost:.2f} px^2 a point: at most {s.cost:g}"
+    if not reason and spread < s.depth_spread:
+        reason = f"depths differ by a factor of {spread:.2f}: need {s.depth_spread:g}"
+    return Attempt(
+        T, uv_a, uv_b, level, good, points.X_world, cost, rivals, parallax, reason
+    )
+
+
+def first_map(camera: Camera, trails: Trails, found: Attempt, settings: Settings) -> VisualMap:
+    """Make a map of two keyframes from a start; the median depth in the first is 1."""
+    first, last = trails.pictures[0], trails.pictures[-1]
+    scale = 1.0 / float(np.median(found.X_a[found.good, 2]))
+    T_b_a = se3.from_rt(se3.rotation(found.T_b_a), scale * se3.translation(found.T_b_a))
+    height, width = first.levels[0].shape
+    visual_map = VisualMap(camera, (height, width), len(first.levels))
+    visual_map.add_keyframe(se3.identity(), first)
+    visual_map.add_keyframe(T_b_a, last)
+    g = found.good
+    numbers = visual_map.add_points(scale * found.X_a[g], 0, found.level[g], found.uv_a[g])
+    visual_map.observe(1, numbers, found.level[g], found.uv_b[g])
+    adjust_all(visual_map, settings, settings.mapper.global_steps)
+    new_points(visual_map, 1, last, settings.mapper, settings.features)
+    adjust_all(visual_map, settings, settings.mapper.global_steps)
+    _set_scale(visual_map)
+    return visual_map
+
+
+def _set_scale(visual_map: VisualMap) -> None:
+    """Make the median depth in the first keyframe 1 again, after the adjustment was free to change it."""
+    scale = 1.0 / float(np.median(visual_map.X_world[visual_map.measured_in(0), 2]))
+    visual_map.X_world[:] *= scale
+    visual_map.T_kf_world[:, :3, 3] *= scale

@@ -1,0 +1,36 @@
+"""Is the pose to be believed?  Good, poor (no keyframe may be made of it), or lost."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from vslam_ref.systems.ptam.settings import TrackerSettings
+from vslam_ref.systems.ptam.tracker.coarse_fine import Pass
+
+
+class Quality(Enum):
+    """How well a picture was tracked."""
+
+    GOOD = "good"
+    POOR = "poor"
+    LOST = "lost"
+
+
+def quality(fine: Pass, settings: TrackerSettings) -> Quality:
+    """Judge the fine pass: how many were found of those tried, how many agree, and how well."""
+    if fine.pose.reason or fine.inliers < settings.least_inliers or fine.pose.sigma > settings.worst_sigma:
+        return Quality.LOST
+    held = fine.weights > 0
+    large = fine.seen.level >= 2
+    share = held.mean()
+    if large.sum() >= 10 and max(held[large].mean(), share) < settings.lost:
+        return Quality.LOST
+    return Quality.GOOD if share > settings.good else Quality.POOR
+
+
+def found_per_level(fine: Pass, levels: int) -> np.ndarray:
+    """Points tried and found on each level, (levels, 2)."""
+    tried = np.bincount(fine.seen.level, minlength=levels)
+    return np.stack([tried, np.bincount(fine.seen.level[fine.weights > 0], minlength=levels)], 1)

@@ -1,0 +1,92 @@
+"""A pose without a guess: patches followed from another picture, three points, and a fine pass."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
+from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.multiview.three_points import p3p
+from vslam_ref.systems.visual_map import Picture, VisualMap
+
+DRAWS = 200
+LIMIT_PX = 3.0
+"""Pixels of level 0, times 2^level: a followed patch farther off counts as wrong."""
+
+
+class Known(NamedTuple):
+    """Points seen in a picture: numbers (n,), pixels of level 0 (n, 2), levels (n,)."""
+
+    point: IntArray
+    uv: Array
+    level: IntArray
+
+
+class Consensus(NamedTuple):
+    """Best pose of many draws and which matches agree with it (n,)."""
+
+    T_cam_world: Array
+    ok: BoolArray
+
+
+def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> Known:
+    """Follow points from one picture into another, each on its level; what was not found is left out."""
+    place, ok = known.uv.copy(), np.zeros(len(known.point), np.bool_)
+    for level in range(len(now.levels)):
+        rows = np.flatnonzero(known.level == level)
+        if len(rows) == 0:
+            continue
+        first = View(before.levels[level], before.corners[level])
+        second = View(now.levels[level], now.corners[level])
+        at = level_from_finest(known.uv[rows], level)
+        went = follow(first, second, at, max(radius / 2.0**level, 4.0))
+        place[rows], ok[rows] = finest_from_level(went.uv, level), went.ok
+    return Known(known.point[ok], place[ok], known.level[ok])
+
+
+def by_three_points(
+    camera: Camera, X_world: Array, known: Known, rng: np.random.Generator, draws: int = DRAWS
+) -> Consensus | None:
+    """Pose with which most matches agree, of poses from three matches; None with fewer than eight that agree."""
+    rays = camera.unproject(known.uv)
+    use = np.flatnonzero(rays.valid)
+    if len(use) < 8:
+        return None
+    sample = np.array([rng.choice(use, 3, replace=False) for _ in range(draws)])
+    found = p3p(rays.bearing[sample], X_world[sample])
+    T = found.T_cam_world[found.valid]
+    if len(T) == 0:
+        return None
+    at = camera.pixel_from_world(T[:, None], X_world[None])
+    limit = LIMIT_PX * level_sigma(known.level)
+    error = np.where(at.valid, np.hypot(*np.moveaxis(at.uv - known.uv, -1, 0)) / limit, np.inf)
+    cost = np.minimum(error**2, 1.0).sum(1)
+    best = int(np.argmin(cost))
+    ok = error[best] < 1.0
+    return Consensus(T[best], ok) if np.count_nonzero(ok) >= 8 else None
+
+
+def known_in(visual_map: VisualMap, kf: int) -> Known:
+    """Points that a keyframe sees."""
+    seen = visual_map.sightings
+    rows = (seen["kf"] == kf) & seen["on"]
+    return Known(seen["point"][rows], seen["uv"][rows], seen["level"][rows])
+
+
+def picture_of(visual_map: VisualMap, kf: int) -> Picture:
+    """Return a keyframe as a picture."""
+    levels = tuple(visual_map.image(level)[kf] for level in range(visual_map.levels))
+    return Picture(
+        int(visual_map.keyframes["frame"][kf]), levels, visual_map.corners[kf], visual_map.small[kf]
+    )
+
+
+def most_alike(visual_map: VisualMap, picture: Picture, count: int) -> IntArray:
+    """Keyframes whose small images differ least, without their means."""
+    here = picture.small.value - picture.small.value.mean()
+    others = np.stack([small.value - small.value.mean() for small in visual_map.small])
+    order: IntArray = np.argsort(((others - here) ** 2).sum((1, 2)), kind="stable")
+    return order[:count]

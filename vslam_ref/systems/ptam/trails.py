@@ -1,0 +1,109 @@
+"""Before there is a map: corners of a first picture, followed from picture to picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
+from vslam_ref.systems.ptam.look import strong_corners
+from vslam_ref.systems.ptam.settings import FeatureSettings, StartSettings
+from vslam_ref.systems.visual_map import Picture
+
+LEVELS = (0, 1)
+"""Of the pyramid, on which trails run: a bare scene has too few corners on one."""
+
+
+@dataclass
+class Trails:
+    """Points of a first picture and where they are now.
+
+    Attributes
+    ----------
+    pictures : list of Picture
+        From the first to the newest.
+    level : ndarray of int64, shape (n,)
+    first, now : ndarray, shape (n, 2)
+        Pixels of level 0.
+    """
+
+    pictures: list[Picture]
+    level: IntArray
+    first: Array
+    now: Array
+    speed: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @property
+    def length(self) -> float:
+        """Median distance that the points have moved, pixels."""
+        return float(np.median(np.hypot(*(self.now - self.first).T))) if len(self.now) else 0.0
+
+
+def begin(picture: Picture, s: StartSettings, f: FeatureSettings) -> Trails:
+    """Take the strongest corners of a picture, spread over it."""
+    level, place = [], []
+    for each in LEVELS:
+        number = strong_corners(picture, each, f, 20 * s.trails)
+        xy = picture.corners[each].xy[number]
+        rows = spread(xy, picture.levels[each].shape, s.trails // (1 + each))
+        level.append(np.full(len(rows), each))
+        place.append(finest_from_level(xy[rows], each))
+    uv = np.concatenate(place)
+    return Trails([picture], np.concatenate(level), uv, uv.copy(), np.zeros_like(uv))
+
+
+def spread(xy: IntArray, shape: tuple[int, ...], count: int) -> IntArray:
+    """Rows of at most ``count`` points, strongest first, so that all parts of a picture have their share."""
+    side = max(int(np.ceil(np.sqrt(shape[0] * shape[1] / max(count, 1) * 3.0))), 8)
+    cell = xy[:, 1] // side * (shape[1] // side + 1) + xy[:, 0] // side
+    order = np.argsort(cell, kind="stable")
+    start = np.concatenate([[True], np.diff(cell[order]) != 0]) if len(order) else np.zeros(0, bool)
+    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0)) if len(order) else order
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order)) - first
+    chosen: IntArray = np.sort(np.argsort(rank, kind="stable")[:count])
+    return chosen
+
+
+def go_on(trails: Trails, picture: Picture, s: StartSettings) -> Trails:
+    """Follow all trails into the next picture; those that are lost end."""
+    last = trails.pictures[-1]
+    guess = trails.now + trails.speed
+    now, ok = _followed(last, picture, trails.level, trails.now, guess, s.search_radius)
+    kept = Trails(
+        [*trails.pictures, picture],
+        trails.level[ok],
+        trails.first[ok],
+        now[ok],
+        (now - trails.now)[ok],
+    )
+    return kept
+
+
+def from_the_first(trails: Trails, s: StartSettings) -> Array:
+    """Where the first picture's own patches lie now (n, 2); NaN where they are not found any more.
+
+    Followed from picture to picture, a patch drifts off by a little each time.
+    """
+    first, last = trails.pictures[0], trails.pictures[-1]
+    now, ok = _followed(first, last, trails.level, trails.first, trails.now, 4.0)
+    return np.where(ok[:, None], now, np.nan)
+
+
+def _followed(
+    a: Picture, b: Picture, level: IntArray, uv: Array, guess: Array, radius: float
+) -> tuple[Array, Array]:
+    place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
+    for each in LEVELS:
+        rows = np.flatnonzero(level == each)
+        went = follow(
+            View(a.levels[each], a.corners[each]),
+            View(b.levels[each], b.corners[each]),
+            level_from_finest(uv[rows], each),
+            max(radius / float(level_sigma(each)), 3.0),
+            guess=level_from_finest(guess[rows], each),
+        )
+        place[rows], ok[rows] = finest_from_level(went.uv, each), went.ok
+    return place, ok

@@ -1,0 +1,151 @@
+r"""Which points of the map a camera should see, where, how large, and how turned.
+
+Around a point the surface is taken for a plane across the axis of the keyframe in which it was first seen.  One
+pixel there moves the point by :math:`Z_s\, \mathrm{d}x_n/\mathrm{d}u_s` in that plane, so
+
+.. math:: A = \frac{\partial u}{\partial X_{cam}}\; R_{cam\,s}
+   \begin{bmatrix} 1 & 0 \\ 0 & 1 \\ 0 & 0 \end{bmatrix} Z_s \frac{\partial x_n}{\partial u_s} .
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
+from vslam_ref.features import Templates, level_from_finest, level_sigma, sampling, search_level, warp
+from vslam_ref.features.templates import AFTER, BEFORE
+from vslam_ref.geometry import se3
+from vslam_ref.systems.visual_map.visual_map import VisualMap
+
+MARGIN = 5.0
+"""Pixels of the level on which a point is looked for, that it must keep from the border."""
+
+
+class Sources(NamedTuple):
+    """Where points were first seen: keyframe, level, pixel of level 0 (n, 2), d xn / d pixel (n, 2, 2), depth."""
+
+    kf: IntArray
+    level: IntArray
+    uv: Array
+    slope: Array
+    depth: Array
+
+
+def sources(visual_map: VisualMap, points: IntArray) -> Sources:
+    """Where points (n,) were first seen."""
+    table = visual_map.points
+    kf = table["source_kf"][points]
+    row = visual_map.T_kf_world[kf, 2]
+    depth = np.einsum("ni,ni->n", row[:, :3], visual_map.X_world[points]) + row[:, 3]
+    return Sources(
+        kf, table["source_level"][points], table["source_uv"][points], table["slope"][points], depth
+    )
+
+
+class Visible(NamedTuple):
+    """Points that a camera should see.
+
+    Attributes
+    ----------
+    point : ndarray of int64, shape (n,)
+        Their numbers.
+    uv : ndarray, shape (n, 2)
+        Pixels of level 0.
+    depth : ndarray, shape (n,)
+    A : ndarray, shape (n, 2, 2)
+        d pixel / d pixel of the source, both of level 0.
+    level : ndarray of int64, shape (n,)
+        On which to look.
+    """
+
+    point: IntArray
+    uv: Array
+    depth: Array
+    A: Array
+    level: IntArray
+
+    def only(self, rows: ArrayLike) -> Visible:
+        """Return those of a mask, or of row numbers."""
+        return Visible(*(values[rows] for values in self))
+
+
+def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | None = None) -> Visible:
+    """Points that a camera at a pose should see.
+
+    Parameters
+    ----------
+    visual_map : VisualMap
+    T_cam_world : array_like, shape (4, 4)
+    points : array_like of int, optional
+        Ask these only; all that are alive by default.
+
+    Returns
+    -------
+    Visible
+        In the order of their numbers, or as asked.
+    """
+    T = as_array("T_cam_world", T_cam_world, 4, 4)
+    number = np.flatnonzero(visual_map.alive) if points is None else np.asarray(points, dtype=np.int64)
+    X_cam = se3.act(T, visual_map.X_world[number])
+    height, width = visual_map.shape
+    number, X_cam = _roughly_inside(visual_map, number, X_cam)
+    at = visual_map.camera.project_with_jacobians(X_cam)
+    inside = (at.uv >= 0).all(1) & (at.uv <= (width - 1, height - 1)).all(1) & at.valid
+    number, X_cam, uv, J = (a[inside] for a in (number, X_cam, at.uv, at.J_point))
+    origin = sources(visual_map, number)
+    A = affine(visual_map, origin, T, J)
+    level = search_level(A * level_sigma(origin.level)[:, None, None], visual_map.levels)
+    at_level = level_from_finest(uv, np.maximum(level, 0))
+    edge = np.array([width, height]) / level_sigma(np.maximum(level, 0))[:, None] - 1 - MARGIN
+    good = (level >= 0) & (at_level >= MARGIN).all(1) & (at_level <= edge).all(1)
+    return Visible(number, uv, X_cam[:, 2], A, level).only(good)
+
+
+def _roughly_inside(visual_map: VisualMap, number: IntArray, X_cam: Array) -> tuple[IntArray, Array]:
+    """Leave out what is behind the camera or far outside its field, before the lens is asked."""
+    camera, (height, width) = visual_map.camera, visual_map.shape
+    border = camera.unproject([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+    if not border.valid.all():
+        return number, X_cam
+    reach = 1.5 * np.abs(border.xn).max()
+    keep = (X_cam[:, 2] > 0) & (np.abs(X_cam[:, :2]) <= reach * X_cam[:, 2:]).all(1)
+    return number[keep], X_cam[keep]
+
+
+def affine(visual_map: VisualMap, origin: Sources, T_cam_world: Array, J_point: Array) -> Array:
+    """A (n, 2, 2), d pixel / d pixel of the source, from d pixel / d X_cam (n, 2, 3).
+
+    Implements :eq:`eq-patch-affine`.
+    """
+    R_cam_kf = se3.rotation(T_cam_world) @ np.swapaxes(se3.rotation(visual_map.T_kf_world), -1, -2)
+    in_plane = origin.slope * origin.depth[:, None, None]
+    A: Array = (J_point @ R_cam_kf[origin.kf][:, :, :2]) @ in_plane  # eq-patch-affine
+    return A
+
+
+def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray) -> Templates:
+    """Patches (n, 8, 8) as the levels (n,) on which they are looked for should show them."""
+    at = level_from_finest(origin.uv, origin.level)
+    M = sampling(A, level, origin.level)
+    patch = np.zeros((len(at), BEFORE + AFTER + 1, BEFORE + AFTER + 1), np.uint8)
+    inside = np.zeros(len(at), np.bool_)
+    for each in range(visual_map.levels):
+        rows = np.flatnonzero(origin.level == each)
+        if len(rows) == 0:
+            continue
+        images = visual_map.image(each)
+        height, width = images.shape[1:]
+        above = np.stack([np.zeros(len(rows)), origin.kf[rows] * float(height)], 1)  # images lie in one column
+        found = warp(images.reshape(-1, width), at[rows] + above, M[rows])
+        patch[rows], inside[rows] = found.patch, found.inside & _whole(at[rows], M[rows], height)
+    return Templates(patch, inside)
+
+
+def _whole(uv: Array, M: Array, height: int) -> BoolArray:
+    """Whether no row of a patch lies in another keyframe's image."""
+    corners = np.array([[x, y] for x in (-BEFORE, AFTER) for y in (-BEFORE, AFTER)], np.float64)
+    y = uv[:, 1:] + np.einsum("nj,kj->nk", M[:, 1], corners)
+    return np.asarray(((y >= 0) & (y <= height - 1)).all(1))
