@@ -22,6 +22,13 @@ def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Picture:
     return Picture(number, levels, corners, small_image(levels[coarse], coarse))
 
 
+def peaks(picture: Picture, level: int, settings: FeatureSettings) -> IntArray:
+    """Pixels (n, 2) of a level's corners that are stronger than their neighbours."""
+    corners = picture.corners[level]
+    score = corner_score(picture.levels[level], corners.xy, settings.arc)
+    return corners.xy[is_peak(corners, score)]
+
+
 def strong_corners(picture: Picture, level: int, settings: FeatureSettings, most: int) -> IntArray:
     """Numbers of a level's corners that are peaks and strong, strongest first, at most ``most``."""
     image, corners = picture.levels[level], picture.corners[level]

@@ -12,7 +12,7 @@ from vslam_ref.features import Templates, finest_from_level, level_from_finest, 
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.multiview import Views
-from vslam_ref.systems.ptam.look import strong_corners
+from vslam_ref.systems.ptam.look import peaks, strong_corners
 from vslam_ref.systems.ptam.mapper.curve_search import Corner, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
 from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, shared_points
@@ -103,8 +103,8 @@ def _with_partner(
     there = picture_of(visual_map, partner)
     T = visual_map.T_kf_world
     a = Side(picture, with_bearings(camera, xy, level), T[kf])
-    b = Side(there, with_bearings(camera, there.corners[level].xy, level), T[partner])
-    back = with_bearings(camera, picture.corners[level].xy, level)
+    b = Side(there, with_bearings(camera, peaks(there, level, f), level), T[partner])
+    back = with_bearings(camera, peaks(picture, level, f), level)
     pairs = match(a, b, back, level, s.near * median, s, f)
     if len(pairs.row) == 0:
         return np.zeros(0, np.int64), used
