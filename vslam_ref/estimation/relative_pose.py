@@ -34,6 +34,8 @@ REGULAR = 1e9
 """Condition of a homography from which on it is no map of a plane that is seen."""
 PLANE_DRAWS = 500
 """Samples at most for the homography: enough for a plane that holds 35 % of the pairs (confidence 0.999)."""
+NEAR = Options(max_iterations=30, step=1e-4, cost=1e-5)
+"""A candidate need be refined only so far that costs can be compared: far within its own uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -249,9 +251,8 @@ def _candidates(
 
 def _polished(a: Array, b: Array, T: Array, near: BoolArray, sigma: float) -> Array:
     """A motion after least squares on the pairs near it, then Tukey's loss on all pairs."""
-    options = Options(max_iterations=30)
-    first = refine_motion(a[near], b[near], T, sigma=sigma, options=options)
-    return refine_motion(a, b, first.T_b_a, sigma=sigma, loss=tuned("tukey"), options=options).T_b_a
+    first = refine_motion(a[near], b[near], T, sigma=sigma, options=NEAR)
+    return refine_motion(a, b, first.T_b_a, sigma=sigma, loss=tuned("tukey"), options=NEAR).T_b_a
 
 
 def _verdict(a: Array, b: Array, choice: Choice, H: Consensus, sigma: float) -> Verdict:

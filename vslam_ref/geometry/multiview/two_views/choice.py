@@ -26,7 +26,7 @@ from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION, trunc
 
 RATIO, MARGIN = 1.5, 0.01
 """A rival is told apart if it costs at least RATIO times the best cost, and MARGIN sigma^2 a pair more."""
-SAME_VALLEY = 0.05
+SAME_VALLEY = 0.1
 """Motions whose rotations and directions differ by less, radians, are one answer: adjusting joins them."""
 
 
