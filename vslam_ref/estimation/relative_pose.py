@@ -34,6 +34,8 @@ REGULAR = 1e9
 """Condition of a homography from which on it is no map of a plane that is seen."""
 PLANE_DRAWS = 500
 """Samples at most for the homography: enough for a plane that holds 35 % of the pairs (confidence 0.999)."""
+FEW = 15
+"""Pairs that must fit a motion, three samples' worth: the best of thousands fits some by chance."""
 NEAR = Options(max_iterations=30, step=1e-4, cost=1e-5)
 """A candidate need be refined only so far that costs can be compared: far within its own uncertainty."""
 
@@ -222,9 +224,7 @@ def estimate_motion(
     motions, names = _candidates(a, b, E, H, sigma)
     choice = two_views.choose(motions, names, a, b, sigma=sigma)
     verdict = _verdict(a, b, choice, H, sigma)
-    reason = choice.reason
-    if verdict.degeneracy not in (Degeneracy.NONE, Degeneracy.PLANE):
-        reason = verdict.reason
+    reason = _reason(choice, verdict)
     return MotionEstimate(choice.T_b_a, choice.inliers, choice, verdict, E, H, reason)
 
 
@@ -253,6 +253,16 @@ def _polished(a: Array, b: Array, T: Array, near: BoolArray, sigma: float) -> Ar
     """A motion after least squares on the pairs near it, then Tukey's loss on all pairs."""
     first = refine_motion(a[near], b[near], T, sigma=sigma, options=NEAR)
     return refine_motion(a, b, first.T_b_a, sigma=sigma, loss=tuned("tukey"), options=NEAR).T_b_a
+
+
+def _reason(choice: Choice, verdict: Verdict) -> str:
+    """Empty, or why the best motion may not be used."""
+    fitting = int(choice.inliers.sum())
+    if fitting < FEW:
+        return f"too few pairs: {fitting} fit the best motion, need {FEW}"
+    if verdict.degeneracy not in (Degeneracy.NONE, Degeneracy.PLANE):
+        return verdict.reason
+    return choice.reason
 
 
 def _verdict(a: Array, b: Array, choice: Choice, H: Consensus, sigma: float) -> Verdict:

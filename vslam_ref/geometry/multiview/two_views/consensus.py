@@ -22,13 +22,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma
+from vslam_ref.geometry.multiview.two_views.eight_point import linear_essential
 from vslam_ref.geometry.multiview.two_views.five_point import five_point_essentials
 from vslam_ref.geometry.multiview.two_views.homography import fit_homography
 from vslam_ref.geometry.multiview.two_views.sampson import essential_sampson, homography_sampson
@@ -45,8 +46,9 @@ class Draws:
     ----------
     confidence : float
         Probability in (0, 1) that at least one sample has no wrong pair.
-    most : int
-        Samples at most.
+    least, most : int
+        Samples at least and at most.  Some more than the confidence asks for choose among clean samples the
+        one that noise has harmed least.
     batch : int
         Samples that are solved at once.
 
@@ -57,12 +59,13 @@ class Draws:
     """
 
     confidence: float = 0.999
+    least: int = 200
     most: int = 2000
     batch: int = 50
 
     def __post_init__(self) -> None:
         """Refuse settings that mean nothing."""
-        if not 0.0 < self.confidence < 1.0 or self.most < 1 or self.batch < 1:
+        if not 0.0 < self.confidence < 1.0 or min(self.least, self.most, self.batch) < 1:
             raise ValueError(f"{self}: need a confidence in (0, 1), and counts of at least 1")
 
 
@@ -135,9 +138,11 @@ def essential_consensus(
         found = five_point_essentials(sample_a, sample_b)
         return found.E[found.valid]
 
-    return _consensus(
-        a, b, rng, checked_sigma(sigma), draws or Draws(), (5, ONE_EQUATION, models, _squared_E)
-    )
+    def refit(good_a: Array, good_b: Array) -> Array:
+        return linear_essential(good_a, good_b).E
+
+    kind = _Kind(5, 8, ONE_EQUATION, models, refit, _squared_E)
+    return _consensus(a, b, rng, checked_sigma(sigma), draws or Draws(), kind)
 
 
 def homography_consensus(
@@ -159,7 +164,7 @@ def homography_consensus(
     (True, '')
     """
     a, b = checked_pairs(xn_a, xn_b)
-    kind = (4, TWO_EQUATIONS, fit_homography, _squared_H)
+    kind = _Kind(4, 5, TWO_EQUATIONS, fit_homography, fit_homography, _squared_H)
     return _consensus(a, b, rng, checked_sigma(sigma), draws or Draws(), kind)
 
 
@@ -185,44 +190,57 @@ def truncated_cost(squared: Array, most: float) -> Array:
     return np.asarray(np.minimum(squared, most).mean(axis=-1))
 
 
+class _Kind(NamedTuple):
+    """A model: pairs of a sample, pairs of a fit to many, squared threshold, and its three functions."""
+
+    size: int
+    many: int
+    most: float
+    models: Callable[[Array, Array], Array]
+    refit: Callable[[Array, Array], Array]
+    squared: Callable[[Array, Array, Array], Array]
+
+
 def _consensus(
-    a: Array,
-    b: Array,
-    rng: np.random.Generator,
-    sigma: float,
-    draws: Draws,
-    kind: tuple[int, float, Any, Any],
+    a: Array, b: Array, rng: np.random.Generator, sigma: float, draws: Draws, kind: _Kind
 ) -> Consensus:
     """Draw batches of samples until the confidence is reached."""
-    size, most, models, squared = kind
     if a.ndim != 2:
         raise ValueError(f"xn_a has shape {a.shape}: need (N, 2)")
-    none = np.zeros((3, 3))
-    if len(a) < size:
-        why = f"{len(a)} pairs: need at least {size}"
-        return Consensus(none, np.zeros(len(a), dtype=bool), most, 0, False, why)
-    best, cost, inliers, drawn, needed = none, most, np.zeros(len(a), dtype=bool), 0, math.inf
-    while drawn < min(needed, draws.most):
-        rows = _samples(rng, min(draws.batch, draws.most - drawn), len(a), size)
+    best, cost, drawn, needed = np.zeros((3, 3)), kind.most, 0, math.inf
+    inliers = np.zeros(len(a), dtype=bool)
+    if len(a) < kind.size:
+        return Consensus(best, inliers, cost, 0, False, f"{len(a)} pairs: need at least {kind.size}")
+    while drawn < min(max(needed, draws.least), draws.most):
+        rows = _samples(rng, min(draws.batch, draws.most - drawn), len(a), kind.size)
         drawn += len(rows)
-        candidate, candidate_cost = _cheapest(models(a[rows], b[rows]), a, b, sigma, most, squared)
-        if candidate_cost < cost:
-            best, cost = candidate, candidate_cost
-            inliers = squared(best, a, b) <= most * sigma**2
-            needed = draws_needed(float(inliers.mean()), size, draws.confidence)
-    reason = "" if inliers.sum() >= size else f"no model of {drawn} samples fits {size} pairs"
+        candidate, price = _cheapest(kind.models(a[rows], b[rows]), a, b, sigma, kind)
+        if price < cost:
+            best, cost = _improved(candidate, price, a, b, sigma, kind)
+            inliers = kind.squared(best, a, b) <= kind.most * sigma**2
+            needed = draws_needed(float(inliers.mean()), kind.size, draws.confidence)
+    reason = "" if inliers.sum() >= kind.size else f"no model of {drawn} samples fits {kind.size} pairs"
     return Consensus(best, inliers, cost, drawn, drawn >= needed, reason)
 
 
-def _cheapest(
-    models: Array, a: Array, b: Array, sigma: float, most: float, squared: Callable[..., Array]
-) -> tuple[Array, float]:
+def _cheapest(models: Array, a: Array, b: Array, sigma: float, kind: _Kind) -> tuple[Array, float]:
     """Return the model with the smallest truncated cost, and that cost."""
     if len(models) == 0:
         return np.zeros((3, 3)), math.inf
-    costs = truncated_cost(squared(models, a, b) / sigma**2, most)
+    costs = truncated_cost(kind.squared(models, a, b) / sigma**2, kind.most)
     best = int(np.argmin(costs))
     return models[best], float(costs[best])
+
+
+def _improved(
+    model: Array, cost: float, a: Array, b: Array, sigma: float, kind: _Kind
+) -> tuple[Array, float]:
+    """Return the model or the linear one of all pairs that fit it, whichever is cheaper."""
+    good = kind.squared(model, a, b) <= kind.most * sigma**2
+    if good.sum() < kind.many:
+        return model, cost
+    other, price = _cheapest(kind.refit(a[good], b[good])[None], a, b, sigma, kind)
+    return (other, price) if price < cost else (model, cost)
 
 
 def _samples(rng: np.random.Generator, count: int, n: int, size: int) -> IntArray:

@@ -155,10 +155,11 @@ def homography_sampson(H: ArrayLike, x_a: ArrayLike, x_b: ArrayLike) -> Array:
     error = y - b
     rest = H[..., None, :2, :2] - y[..., :, None] * H[..., None, 2:, :2]
     J = rest / depth[..., None, None]  # of H x_a in x_a; in x_b it is minus the identity
-    S = J @ transpose(J) + np.eye(2)
-    first = np.sqrt(S[..., 0, 0])  # S = L L': the residual is L^-1 times the error
-    below = S[..., 1, 0] / first
-    second = np.sqrt(S[..., 1, 1] - below**2)
+    # J J' + I = L L', and the residual is L^-1 times the error; its determinant by a sum, not a difference
+    first = np.sqrt(1.0 + np.sum(J[..., 0, :] ** 2, axis=-1))
+    below = np.sum(J[..., 0, :] * J[..., 1, :], axis=-1) / first
+    det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+    second = np.sqrt(1.0 + np.sum(J**2, axis=(-2, -1)) + det**2) / first
     r0 = error[..., 0] / first
     r1 = (error[..., 1] - below * r0) / second
     return np.asarray(np.where(front[..., None], np.stack([r0, r1], axis=-1), np.inf))
