@@ -32,6 +32,7 @@ from typing import NoReturn
 import numpy as np
 from damaging import mutate
 from reader_samples import SAMPLES, Sample, reader
+from sequence_samples import put
 
 from vslam_ref.datasets.text import FormatError
 
@@ -145,8 +146,7 @@ def fuzz(name: str, numbers: range, seed: int, root: Path) -> Tally:
         if which not in folders:
             folders[which] = root / str(which)
             folders[which].mkdir()
-            for other, content in sample.files.items():
-                (folders[which] / other).write_bytes(content)
+            put(folders[which], sample.files)
         path = folders[which] / file
         path.write_bytes(data)
         begin = time.perf_counter()

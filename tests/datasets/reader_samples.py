@@ -19,9 +19,10 @@ import bundle_samples
 import cv2
 import numpy as np
 import scipy.io
+from sequence_samples import CALIB, LAYOUTS, SIZE
 
 from vslam_ref.datasets.bundle_files import BundleFile
-from vslam_ref.datasets.trajectories import TrajectoryFile
+from vslam_ref.datasets.trajectories import AsRead, TrajectoryFile
 from vslam_ref.geometry.cameras import Camera
 
 
@@ -135,6 +136,12 @@ def camera_wrong(file: Any) -> str:
         if recorded.size is not None and min(recorded.size) < 1:
             return f"size {recorded.size}"
     return ""
+
+
+def pose_wrong(T: np.ndarray) -> str:
+    """A rigid motion."""
+    right = T.shape == (4, 4) and np.abs(T[:3, :3].T @ T[:3, :3] - np.eye(3)).max() < 1e-12
+    return "" if right and (T[3] == (0, 0, 0, 1)).all() else "no rigid motion"
 
 
 # --- the samples -----------------------------------------------------------------------------------
@@ -276,6 +283,10 @@ def _one(name: str, content: str) -> dict[str, bytes]:
     return {name: content.encode()}
 
 
+def _folder(folder: Path) -> tuple[Path]:
+    return (folder,)
+
+
 def _picture(suffix: str) -> dict[str, bytes]:
     return {f"a{suffix}": cv2.imencode(suffix, _GREY)[1].tobytes()}
 
@@ -331,6 +342,7 @@ SAMPLES: dict[str, list[Sample]] = {
     "calibration_files.tum_mono:read_tum_mono": [Sample(_one("camera.txt", TUM_MONO), check=camera_wrong)],
     "carmen:read": [Sample(_one("corrected.log", CARMEN))],
     "pictures:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
+    "pictures:read_picture": [Sample(_picture(".png"), binary=True), Sample(_picture(".jpg"), binary=True)],
     "grid_files:read_ros_map": [
         Sample(
             {"map.yaml": ROS_MAP.encode(), "map.pgm": cv2.imencode(".pgm", _GREY)[1].tobytes()},
@@ -349,6 +361,35 @@ SAMPLES: dict[str, list[Sample]] = {
     "mrclam:read_truth": [Sample(_encoded(MRCLAM_TRUTH), lambda folder: (folder, 1, _MRCLAM_LOG))],
     "mrclam:read_barcodes": [Sample(_one("Barcodes.dat", MRCLAM["Barcodes.dat"]), lambda folder: (folder,))],
     "nist:read_problem": [Sample(_one("Toy.dat", NIST))],
+    "sequences.cameras:read_camera": [
+        Sample(_one("calib.txt", CALIB), lambda folder: (folder / "calib.txt", SIZE), check=camera_wrong),
+        Sample(
+            _one("camera.cfg", PTAM), lambda folder: (folder / "camera.cfg", (640, 480)), check=camera_wrong
+        ),
+        Sample(_one("camera", OPENCV), lambda folder: (folder / "camera", (640, 480)), check=camera_wrong),
+        Sample(
+            _one("camera", TUM_MONO), lambda folder: (folder / "camera", (1280, 1024)), check=camera_wrong
+        ),
+    ],
+    "sequences.cameras:read_plain_camera": [Sample(_one("calib.txt", CALIB), check=camera_wrong)],
+    "sequences.cameras:read_kitti_camera": [
+        Sample({"calib.txt": LAYOUTS["kitti"]()["calib.txt"]}, check=camera_wrong)
+    ],
+    "sequences.times:read_times": [Sample(_one("times.txt", "0.0\n0.1\n0.1\n0.35\n"))],
+    "sequences.contents:read_pose": [
+        Sample({"a.pose.txt": LAYOUTS["7scenes"]()["frame-000003.pose.txt"]}, check=pose_wrong)
+    ],
+    "sequences.contents:read_folder": [Sample(files(), _folder) for files in LAYOUTS.values()],
+    "sequences.euroc:read_image_list": [
+        Sample({"data.csv": LAYOUTS["euroc"]()["mav0/cam0/data.csv"]}, lambda folder: (folder,))
+    ],
+    "sequences.euroc:read_truth": [
+        Sample(
+            {"data.csv": EUROC.encode(), "sensor.yaml": SENSOR.encode()},
+            lambda folder: (folder / "data.csv", folder / "sensor.yaml"),
+            check=lambda found: trajectory_wrong(TrajectoryFile(found, "euroc", AsRead(), 0.0, 0)),
+        )
+    ],
     "trajectories.reading:read": [
         Sample(_one("path.txt", TUM), check=trajectory_wrong),
         Sample(_one("path.csv", EUROC), check=trajectory_wrong),

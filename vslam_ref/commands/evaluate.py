@@ -20,7 +20,8 @@ alignment of the estimate before the absolute error (ATE) is measured:
   sim3    best rotation, translation and scale: for one camera, which does not know the scale
 
 Poses are paired by time: nearest, at most 0.01 s apart, each used once; KITTI files, which have no
-times, line by line. The relative error (RPE) is that of the step from each pair to the next.
+times, line by line. Of poses with equal times only the first is paired. The relative error (RPE) is that
+of the step from each pair to the next.
 
 formats: tum (t tx ty tz qx qy qz qw), kitti (12 numbers), euroc (ns,tx,ty,tz,qw,qx,qy,qz); '.gz' is unpacked
 
@@ -32,6 +33,7 @@ and with your own:
 
 ALIGNMENTS = ("none", "se3", "sim3")
 FORMATS = ("tum", "kitti", "euroc")
+FIRST = "of equal times only the first is paired"
 PLOTS = (".png", ".svg")
 ROWS = (
     ("pairs", "pairs of poses", ""),
@@ -91,7 +93,7 @@ def _notes(found: Evaluation, *read: tuple[str, TrajectoryFile]) -> list[str]:
     notes = []
     for name, file in read:
         if file.repeated:
-            notes.append(f"{name}: {file.repeated} pose(s) with the time of the pose before")
+            notes.append(f"{name}: {file.repeated} pose(s) with the time of the pose before; {FIRST}")
         if file.unit_error > 1e-6:
             what = "R^T R" if file.format == "kitti" else "quaternion lengths"
             did = "used as they are" if file.format == "kitti" else "normalised"

@@ -12,6 +12,7 @@ module                                      holds
 ``nist``                                    certified regressions
 ``nist_models``                             their fifteen model functions, with Jacobians
 ``pictures``, ``checkerboard``              grey values, and the corners in them
+``sequences``                               pictures in their order, with times, camera and truth
 ``middlebury``, ``matching``                pictures with exact cameras; the same points in several
 ``grid_files``, ``video``                   occupancy maps and films
 ==========================================  ============================================================

@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,23 @@ SUFFIXES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".
 MAX_PIXELS = 100_000_000
 CUT_OFF = "Premature end"
 """What the JPEG decoder writes when it fills the rest of a picture with grey."""
+
+
+class Picture(NamedTuple):
+    """Values of a picture.
+
+    Attributes
+    ----------
+    grey : ndarray of uint8, shape (H, W)
+    colour : ndarray of uint8, shape (H, W, 3), or None
+        Red, green, blue; None where the file has grey values only.
+    bits : int
+        Of a value in the file, 8 or 16; of 16 bits the upper range 0 to 65535 became 0 to 255.
+    """
+
+    grey: GreyImage
+    colour: GreyImage | None = None
+    bits: int = 8
 
 
 def image_files(names: Sequence[Path | str]) -> list[Path]:
@@ -65,13 +83,51 @@ def read_grey(path: Path | str) -> GreyImage:
     """
     import cv2
 
-    path = Path(path)
+    grey: GreyImage = _decoded(Path(path), cv2.IMREAD_GRAYSCALE).astype(np.uint8, copy=False)
+    return grey
+
+
+def read_picture(path: Path | str) -> Picture:
+    """Read an image, grey or colour, of 8 or 16 bits, as it is stored (see :func:`read_grey`).
+
+    Grey values of colours are 0.299 R + 0.587 G + 0.114 B.  An opacity is left out.
+
+    Raises
+    ------
+    FormatError
+        As :func:`read_grey`, and on values that are no whole numbers of 8 or 16 bits.
+    """
+    import cv2
+
+    values = _decoded(Path(path), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+    if values.dtype not in (np.uint8, np.uint16):
+        raise FormatError(Path(path), None, f"values are {values.dtype}; expected whole ones of 8 or 16 bits")
+    bits = 8 * values.dtype.itemsize
+    if bits == 16:
+        values = ((values.astype(np.uint32) + 128) // 257).astype(np.uint8)  # 65535 becomes 255
+    return from_opencv(values, bits)
+
+
+def from_opencv(values: NDArray[Any], bits: int = 8) -> Picture:
+    """Return grey and colour values of what OpenCV holds: uint8 (H, W), or (H, W, 3) as blue, green, red."""
+    import cv2
+
+    if values.ndim == 2:
+        return Picture(values, None, bits)
+    grey, colour = (cv2.cvtColor(values, code) for code in (cv2.COLOR_BGR2GRAY, cv2.COLOR_BGR2RGB))
+    return Picture(grey.astype(np.uint8, copy=False), colour.astype(np.uint8, copy=False), bits)
+
+
+def _decoded(path: Path, flags: int) -> NDArray[Any]:
+    """What OpenCV makes of a file, checked before and after."""
+    import cv2
+
     if not path.is_file():
         raise FormatError(path, None, "no such file")
     require_size(path, MAX_PIXELS)
-    with _complaints() as shown:
+    with complaints() as shown:
         try:
-            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+            image = cv2.imread(str(path), flags | cv2.IMREAD_IGNORE_ORIENTATION)
         except cv2.error as error:  # more than 2^30 pixels
             image = None
             shown.append(str(error.err))
@@ -81,12 +137,11 @@ def read_grey(path: Path | str) -> GreyImage:
         raise FormatError(path, None, f"no image that can be read{f' ({why})' if why else ''}; {right}")
     if CUT_OFF in why:
         raise FormatError(path, None, f"{why}: the picture is cut off; fetch it again")
-    if image.size > MAX_PIXELS:
-        raise FormatError(
-            path, None, f"{image.shape[1]}x{image.shape[0]} pixels; at most {MAX_PIXELS} are read"
-        )
-    grey: GreyImage = image.astype(np.uint8, copy=False)
-    return grey
+    if image.shape[0] * image.shape[1] > MAX_PIXELS:
+        size = f"{image.shape[1]}x{image.shape[0]}"
+        raise FormatError(path, None, f"{size} pixels; at most {MAX_PIXELS} are read")
+    found: NDArray[Any] = image
+    return found
 
 
 def write_png(path: Path, grey: GreyImage) -> None:
@@ -100,7 +155,7 @@ def write_png(path: Path, grey: GreyImage) -> None:
 
 
 @contextmanager
-def _complaints() -> Iterator[list[str]]:
+def complaints() -> Iterator[list[str]]:
     """Collect what the decoders write to the process's standard error: lines that name no file."""
     shown: list[str] = []
     sys.stderr.flush()

@@ -18,9 +18,9 @@ quaternions), and whole nanoseconds (a double holds seconds since 1970 to 2.4e-7
 them, and :func:`write` gives them back.
 
 *Nothing wrong gets in.*  A quaternion whose length, or a matrix whose R^T R, is off by more than
-``UNIT_TOLERANCE`` is refused, and so is a time that goes back.  A time may stand twice in one line of a
-thousand (a recorder's hiccup: the true poses of the TUM set fr2/desk have one); such lines are counted, and
-more are refused.
+``UNIT_TOLERANCE`` is refused, and so is a time that goes back.  A time may stand several times (a recorder's
+hiccup: the true poses of the TUM set fr2/desk have one such line, a phone's clip began with 24); these lines
+are counted, and of equal times only the first is paired with another trajectory.
 """
 
 from vslam_ref.datasets.trajectories.formats import FORMATS, AsRead, TrajectoryFile

@@ -24,7 +24,6 @@ from vslam_ref.metrics.trajectory.poses import Trajectory
 UNIT_TOLERANCE = 1e-3
 """Four decimals of a quaternion move its length by 1e-4 at most, four of a matrix R^T R by 2e-4."""
 
-REPEATED_SHARE = 1e-3
 LONGEST = 1e12
 """Metres; a position must be smaller (the solar system is)."""
 
@@ -111,7 +110,7 @@ def read_euroc(path: Path) -> TrajectoryFile:
         if len(words) != len(names):
             what = f"{len(words)} columns; expected 8: {', '.join(EUROC)} (or these and 9 more)"
             raise FormatError(path, line, what)
-        stamps.append(_nanoseconds(path, line, words[0]))
+        stamps.append(nanoseconds(path, line, words[0]))
         values = [number(path, line, word, name) for word, name in zip(words[1:], names[1:], strict=True)]
         rows.append([0.0, *values[:7]])
         lines.append(line)
@@ -130,7 +129,8 @@ def read_euroc(path: Path) -> TrajectoryFile:
 READERS = {"tum": read_tum, "kitti": read_kitti, "euroc": read_euroc}
 
 
-def _nanoseconds(path: Path, line: int, word: str) -> int:
+def nanoseconds(path: Path, line: int, word: str) -> int:
+    """Read whole nanoseconds, or raise :class:`FormatError`."""
     if not re.fullmatch(r"-?[0-9]{1,18}|-?[0-8][0-9]{18}", word):
         what = f"time [ns] is {word!r}; expected whole nanoseconds below 9e18 (a header begins with #)"
         raise FormatError(path, line, what)
@@ -149,22 +149,14 @@ def _positions(table: Columns, columns: tuple[int, int, int]) -> Array:
 
 
 def _require_times(table: Columns, exact: IntArray | None = None) -> int:
-    """Count times that repeat the one above; refuse times that go back, and too many repetitions."""
+    """Count times that repeat the one above; refuse times that go back."""
     times = table.values[:, 0]
     step = np.diff(times if exact is None else exact)
     after = np.concatenate([[1], step])
     table.require(
         after >= 0, lambda k: f"time {times[k]:.9f} s after {times[k - 1]:.9f} s; times must not go back"
     )
-    same = after == 0
-    if same.sum() > REPEATED_SHARE * len(times):
-        table.require(
-            ~same,
-            lambda k: (
-                f"time {times[k]:.9f} s again; line {table.lines[k - 1]} has it already, expected a later one"
-            ),
-        )
-    return int(same.sum())
+    return int((after == 0).sum())
 
 
 def _rotations(table: Columns, q: Array) -> tuple[Array, float]:
