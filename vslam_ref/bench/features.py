@@ -36,7 +36,7 @@ from vslam_ref.features import (
     shi_tomasi,
     warp,
 )
-from vslam_ref.features.pyramid import Bytes
+from vslam_ref.features.levels import Bytes
 from vslam_ref.support.timing import paired
 from vslam_ref.worlds.pictures import painted_wall, picture
 

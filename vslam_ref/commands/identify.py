@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 HELP = "find gains, delays and noises of a recorded data set, without its truth"
 EPILOG = """\
-data sets: mrclam and victoria_park, found through VSLAM_REF_DATA, or a folder in their format. All robots of an
-MRCLAM set are used together.
+data sets: mrclam and victoria_park, found through VSLAM_REF_DATA, or a folder in their format. All robots of
+an MRCLAM set are used together.
 Takes minutes: every value is moved until the innovations of EKF and IEKF are most likely.
 Without --json the document is printed.
 

@@ -71,10 +71,8 @@ class Board:
         found = re.fullmatch(r"(\d{1,3})[xX](\d{1,3})", text.strip())
         if found is None:
             numbers = re.findall(r"\d{1,3}", text)
-            example = "x".join(numbers) if len(numbers) == 2 else "9x6"
-            raise ValueError(
-                f"board {text!r}: write {example}, inner corners along a row, an x, inner corners along a column"
-            )
+            right = "x".join(numbers) if len(numbers) == 2 else "9x6"
+            raise ValueError(f"board {text!r}: write {right}, inner corners along a row, then along a column")
         return cls(int(found[1]), int(found[2]), square)
 
     @property
