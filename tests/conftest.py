@@ -13,6 +13,7 @@ Property tests draw the same examples in every run.  ``make test-random`` draws 
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import inspect
 from collections.abc import Callable, Iterator
@@ -26,7 +27,8 @@ hypothesis.settings.register_profile("repeatable", deadline=None, database=None,
 hypothesis.settings.register_profile("fresh", deadline=None, database=None, max_examples=1000)
 hypothesis.settings.load_profile("repeatable")
 
-SOLUTIONS = Path(__file__).resolve().parents[1] / "docs" / "chapters" / "solutions"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+SOLUTIONS = DOCS / "chapters" / "solutions"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -56,6 +58,24 @@ def answer(request: pytest.FixtureRequest) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def book_tool() -> Callable[[str], ModuleType]:
+    """Import a script of ``docs/_tools`` by its name; these import each other by theirs."""
+
+    def load(name: str) -> ModuleType:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(str(DOCS / "_tools"))
+            return importlib.import_module(name)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def index(book_tool: Callable[[str], ModuleType]) -> ModuleType:
+    """The tool that knows which code cites which equation."""
+    return book_tool("equation_index")
 
 
 class _SignFlip(ast.NodeTransformer):

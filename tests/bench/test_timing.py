@@ -69,4 +69,4 @@ def test_every_way_of_the_peer_measures_five_landmarks(way: str) -> None:
 def test_rows_name_goal_bound_and_verdict() -> None:
     assert row("EKF-4", "exponent", "numpy", 2.2, "", 2.1)["met"] == "no"
     assert row("EKF-1", "ratio", "numpy", 2.2, "x", 2.0, below=False)["met"] == "yes"
-    assert row("EKF-1", "time", "numpy", 2.2, "us")["met"] is None
+    assert row("EKF-1", "time", "numpy", 2.2, "µs")["met"] is None

@@ -135,7 +135,7 @@ def test_the_choices_are_those_of_the_library() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["{}", "--board", "9by6"], "board '9by6': expected inner corners along a row, 'x'"),
+        (["{}", "--board", "9by6"], "board '9by6': write 9x6, inner corners along a row"),
         (["{}", "--board", "6x4", "--square", "0"], "the side of a square must be a positive number"),
         (["{}", "--board", "6x4", "--square", "big"], "invalid float value: 'big'"),
         (["{}", "--board", "2x4"], "at least 3 inner corners"),

@@ -10,6 +10,7 @@ import types
 import pytest
 
 from vslam_ref import _kernels, cli
+from vslam_ref._kernels import _digests
 from vslam_ref.commands import bench
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.known import DATA_SETS, LICENCE_CLASSES
@@ -141,6 +142,21 @@ def test_warming_compiles_the_kernels_where_numba_is_in_use(monkeypatch, tmp_pat
     assert warmed == [1]
     assert "kernels ready after" in capsys.readouterr().out
     assert json.loads(target.read_text())["backend"] == "numba"
+
+
+def test_warming_declares_every_twin_and_counts_those_set_aside_apart(monkeypatch, tmp_path, capsys):
+    """Every pair of ``digests.json`` is ready or is named as set aside; none is both."""
+    pairs = _digests.stored()["pairs"]
+    monkeypatch.setattr(_kernels, "warm", lambda: None)
+    monkeypatch.setattr(_kernels, "backend", lambda: "numba")
+    monkeypatch.setattr(_kernels, "set_aside", lambda: ["slam:ekf_predict_in_place"])
+    target = tmp_path / "w.json"
+    assert cli.main(["warm-cache", "--json", str(target)]) == 0
+    said = json.loads(target.read_text())
+    assert said["kernels"] == len(pairs) - 1
+    assert said["set_aside"] == ["slam:ekf_predict_in_place"]
+    assert {twin for _, twin in _kernels.REGISTRY.values()} == set(pairs)
+    assert "slam:ekf_predict_in_place" in capsys.readouterr().out
 
 
 def test_warming_says_when_there_is_nothing_to_compile(capsys):

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import doctest
-import importlib
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
 
 PAGE = """---
 jupytext:
@@ -34,26 +31,21 @@ object()
 """
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _tools_on_path() -> Iterator[None]:
-    sys.path.insert(0, str(ROOT / "docs" / "_tools"))
-    yield
-    sys.path.pop(0)
-
-
-def test_the_examples_of_the_sphinx_extension_hold() -> None:
+def test_the_examples_of_the_sphinx_extension_hold(book_tool: Callable[[str], ModuleType]) -> None:
     pytest.importorskip("sphinx", reason="Sphinx comes with the docs extra")
-    result = doctest.testmod(importlib.import_module("house_sphinx"))
+    result = doctest.testmod(book_tool("house_sphinx"))
     assert result.attempted >= 5
     assert result.failed == 0
 
 
 @pytest.fixture
-def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> object:
+def workshop(
+    book_tool: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> ModuleType:
     """The notebook tool, working on a book of one page in a folder of its own."""
     pytest.importorskip("jupytext", reason="jupytext comes with the docs extra")
     pytest.importorskip("nbclient", reason="nbclient comes with the docs extra")
-    tool = importlib.import_module("notebooks")
+    tool = book_tool("notebooks")
     (tmp_path / "chapters").mkdir()
     (tmp_path / "chapters" / "99_page.md").write_text(PAGE, encoding="utf-8")
     monkeypatch.setattr(tool.book, "PAGES", tmp_path / "chapters")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
 HEAD = '"""Module."""\n\n'
 FUNCTION = '''def f({given}) -> Array:
     """Do it{words}."""
@@ -17,10 +16,11 @@ FUNCTION = '''def f({given}) -> Array:
 
 
 @pytest.fixture
-def tool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+def tool(
+    book_tool: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> ModuleType:
     """The check, working on a package of one module in a folder of its own."""
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_tools"))
-    module = importlib.import_module("docstrings")
+    module = book_tool("docstrings")
     (tmp_path / "vslam_ref" / "geometry").mkdir(parents=True)
     monkeypatch.setattr(module.book, "PACKAGE", tmp_path / "vslam_ref")
     monkeypatch.setattr(module, "KNOWN", tmp_path / "known.txt")

@@ -2,23 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(scope="module")
-def index() -> ModuleType:
-    sys.path.insert(0, str(ROOT / "docs" / "_tools"))
-    try:
-        return importlib.import_module("equation_index")
-    finally:
-        sys.path.pop(0)
 
 
 @pytest.mark.parametrize(

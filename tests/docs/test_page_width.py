@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "_tools"))
-
-import book
-
+PAGES = sorted((Path(__file__).resolve().parents[2] / "docs" / "chapters").glob("[0-9]*.md"))
 CELL = re.compile(r"```\{code-cell\}[^\n]*\n(.*?)```", re.DOTALL)
 WIDTH, IMPORTS = 76, 8
 
@@ -20,13 +16,13 @@ def cells(page: Path) -> list[str]:
     return CELL.findall(page.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("page", book.pages(), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_code_cells_fit_the_column(page: Path) -> None:
     wide = [line for cell in cells(page) for line in cell.splitlines() if len(line) > WIDTH]
     assert not wide, f"lines of more than {WIDTH} characters scroll sideways on the page: {wide}"
 
 
-@pytest.mark.parametrize("page", book.pages(), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_first_cell_has_few_imports(page: Path) -> None:
     lines = [line for line in cells(page)[0].splitlines() if line.startswith(("import ", "from "))]
     assert 1 <= len(lines) <= IMPORTS, lines

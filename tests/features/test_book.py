@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from vslam_ref.features import book
 from vslam_ref.features.corners import detect, in_rows, shi_tomasi
-from vslam_ref.features.pyramid import halve
-from vslam_ref.features.refine import refine
-from vslam_ref.features.search import search, zmssd
-from vslam_ref.features.segment_test import corner_score, segment_test
+from vslam_ref.features.fast import corner_score, segment_test
+from vslam_ref.features.levels import halve
+from vslam_ref.features.patch_search import search, zmssd
+from vslam_ref.features.refinement import refine
 from vslam_ref.features.templates import cut, warp
 
 Bytes = NDArray[np.uint8]

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vslam_ref.features.corners import detect, shi_tomasi
-from vslam_ref.features.follow import View, follow
+from vslam_ref.features.following import View, follow
 from vslam_ref.worlds.pictures import moved, painted_wall, picture
 
 Bytes = NDArray[np.uint8]

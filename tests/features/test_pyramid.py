@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vslam_ref.features.pyramid import (
+from vslam_ref.features.levels import (
     finest_from_level,
     halve,
     level_from_finest,

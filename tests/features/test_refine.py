@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from vslam_ref.features.corners import detect
-from vslam_ref.features.refine import State, refine
+from vslam_ref.features.refinement import State, refine
 from vslam_ref.features.templates import cut
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from vslam_ref.features.corners import Corners, detect, in_rows
-from vslam_ref.features.refine import refine
-from vslam_ref.features.search import search, variation, zmssd, zncc
+from vslam_ref.features.patch_search import search, variation, zmssd, zncc
+from vslam_ref.features.refinement import refine
 from vslam_ref.features.templates import cut
 
 Bytes = NDArray[np.uint8]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.datasets import catalogue
 from vslam_ref.features.corners import detect, in_rows, is_peak
-from vslam_ref.features.segment_test import corner_score, segment_test
+from vslam_ref.features.fast import corner_score, segment_test
 
 Bytes = NDArray[np.uint8]
 REFERENCE = catalogue.find("opencv_reference")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vslam_ref.features.small_image import SmallImage, plane_motion, rotation, small_image
+from vslam_ref.features.small_images import SmallImage, plane_motion, rotation, small_image
 from vslam_ref.geometry import se2, so3
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.worlds.pictures import painted_wall, picture

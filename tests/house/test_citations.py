@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-
 NOT_YET: dict[str, int] = {}
 """Chapter -> labels that may be without a citation for now.  Numbers only shrink; at 0 they leave."""
-
-
-@pytest.fixture(scope="module")
-def index() -> ModuleType:
-    sys.path.insert(0, str(ROOT / "docs" / "_tools"))
-    try:
-        return importlib.import_module("equation_index")
-    finally:
-        sys.path.pop(0)
 
 
 def test_labels_are_cited_where_they_are_computed(index: ModuleType) -> None:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.grids.beams import increment_of, scan_of
 from vslam_ref.experiments.grids.following import localise
 from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids import LogOddsGrid, MapConfig, Scan
@@ -185,8 +184,8 @@ def test_starts_that_mean_nothing_are_refused(start: list[float]) -> None:
 
 
 def test_the_first_increment_is_none(hall: HallRun) -> None:
-    assert increment_of(hall.recording, 0) is None
-    assert scan_of(hall.recording, 3).time == pytest.approx(0.6)
+    assert hall.recording.increment(0) is None
+    assert hall.recording.scan(3).time == pytest.approx(0.6)
 
 
 def test_following_a_recording_is_step_after_step(hall: HallRun) -> None:
@@ -258,7 +257,7 @@ def test_with_landmarks_alone_the_filter_is_honest() -> None:
         config = GridSlamConfig(match=False, map=MapConfig(d_memory="text"))
         slam = GridSlam(recording.T_world_robot[0], config)
         for k in range(len(recording)):
-            step = slam.step(increment_of(recording, k), scan_of(recording, k))
+            step = slam.step(recording.increment(k), recording.scan(k))
         e = step.T_world_robot - recording.T_world_robot[-1]
         e[2] = so2.wrap(e[2])
         total += float(e @ np.linalg.solve(step.cov, e))

@@ -158,12 +158,11 @@ def test_beams_are_judged_by_what_they_end_on() -> None:
     poses, total, _ = following.localise(recording, config)
     assert total[0] <= min(total[1], total[2])
     assert total[2] > 100
-    from vslam_ref.experiments.grids.beams import increment_of, scan_of
     from vslam_ref.systems.grid_slam import GridSlam
 
-    slam, mine = GridSlam(recording.poses[0], config), np.zeros(3)
+    slam, mine = GridSlam(recording.T_world_robot[0], config), np.zeros(3)
     for k in range(len(recording)):
-        slam.step(increment_of(recording, k), scan_of(recording, k))
+        slam.step(recording.increment(k), recording.scan(k))
         if k < 25:
             continue
         D = slam.maps.dynamic()  # type: ignore[union-attr]

@@ -67,7 +67,7 @@ def test_sightings_repeated_at_rest_show_the_sensor_noise(
 @pytest.mark.slow
 @pytest.mark.skipif(catalogue.find("utias_mrclam") is None, reason="utias_mrclam is not in VSLAM_REF_DATA")
 def test_the_committed_noises_are_likelier_than_their_neighbours() -> None:
-    logs = read_logs("mrclam")
+    logs = read_logs("mrclam", catalogue.require("utias_mrclam"))
     values = noise.calibration("mrclam")
 
     def likelihood(calibration: RobotCalibration) -> float:

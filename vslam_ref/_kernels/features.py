@@ -28,7 +28,7 @@ NUMBERS = types.Array(types.float64, 1, "C")
 
 @kernel(BYTES, types.int64, returns=NEW_BYTES)
 def halve(flat, width):
-    """Twin of :func:`vslam_ref.features.pyramid._halve`."""
+    """Twin of :func:`vslam_ref.features.levels._halve`."""
     rows, columns = flat.shape[0] // width // 2, width // 2
     mean = np.empty(rows * columns, np.uint8)
     for y in range(rows):
@@ -76,7 +76,7 @@ def _tile(rows, threshold, arc, corner):
 
 @kernel(BYTES, types.int64, types.int64, types.int64, returns=NEW_PIXELS)
 def segment_test(flat, width, threshold, arc):
-    """Twin of :func:`vslam_ref.features.segment_test._segment_test`."""
+    """Twin of :func:`vslam_ref.features.fast._segment_test`."""
     height, columns = flat.shape[0] // width, width - 2 * BORDER
     tiles = (columns + TILE - 1) // TILE
     corner = np.zeros((height, tiles * TILE), np.bool_)
@@ -111,7 +111,7 @@ def _where(corner, columns):
 
 @kernel(BYTES, types.int64, PIXELS, types.int64, returns=NEW_INTEGERS)
 def corner_score(flat, width, xy, arc):
-    """Twin of :func:`vslam_ref.features.segment_test._corner_score`."""
+    """Twin of :func:`vslam_ref.features.fast._corner_score`."""
     offsets = CIRCLE_X + CIRCLE_Y * width
     score = np.empty(xy.shape[0], np.int64)
     brighter = np.empty(32, np.int64)

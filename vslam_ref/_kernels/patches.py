@@ -133,7 +133,7 @@ def _corner_sums(flat, width, xy):
     returns=types.Tuple((NEW_INTEGERS, NUMBERS)),
 )
 def search(flat, width, xy, row_start, patch, uv, radius, correlate):
-    """Twin of :func:`vslam_ref.features.search._search`."""
+    """Twin of :func:`vslam_ref.features.patch_search._search`."""
     height, sums = row_start.shape[0] - 1, _corner_sums(flat, width, xy)
     index, cost = np.full(uv.shape[0], -1), np.full(uv.shape[0], np.inf)
     for n in range(uv.shape[0]):
@@ -196,7 +196,7 @@ def _one_step(flat, width, height, u, v, T, gx, gy):
     returns=types.Tuple((types.Array(types.float64, 2, "C"), NUMBERS, types.Array(types.int8, 1, "C"))),
 )
 def refine(flat, width, patch, uv):
-    """Twin of :func:`vslam_ref.features.refine._refine`."""
+    """Twin of :func:`vslam_ref.features.refinement._refine`."""
     height = flat.shape[0] // width
     place, offset, state = uv.copy(), np.zeros(uv.shape[0]), np.full(uv.shape[0], SLOW, np.int8)
     T, gx, gy = np.empty(INNER * INNER), np.empty(INNER * INNER), np.empty(INNER * INNER)

@@ -15,18 +15,15 @@ the patch search is ``cv2.matchTemplate`` in a window around each point, that of
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
-from vslam_ref import _kernels
 from vslam_ref.arrays import Array
-from vslam_ref.bench.rows import row
+from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.datasets import catalogue, pictures
 from vslam_ref.features import (
     Corners,
@@ -39,7 +36,7 @@ from vslam_ref.features import (
     shi_tomasi,
     warp,
 )
-from vslam_ref.features.pyramid import Bytes
+from vslam_ref.features.levels import Bytes
 from vslam_ref.support.timing import paired
 from vslam_ref.worlds.pictures import painted_wall, picture
 
@@ -62,14 +59,13 @@ def run(quick: bool = False) -> dict[str, Any]:
     """Measure everything on one thread; ``rows`` is a list of flat records."""
     import cv2
 
-    backends = [b for b in ("numpy", "numba") if b == "numpy" or importlib.util.find_spec("numba")]
-    rows: list[dict[str, Any]] = []
     cv2.setNumThreads(1)
-    with threadpool_limits(1):
-        for name, pair in images().items():
-            for backend in backends:
-                with _kernels.use_backend(backend):
-                    rows += measure(name, scene(*pair), backend, quick)
+    pairs = images()
+
+    def all_pairs(backend: str, quick: bool) -> list[Row]:
+        return [r for name, pair in pairs.items() for r in measure(name, scene(*pair), backend, quick)]
+
+    rows = measured("features", on_each_backend(quick, all_pairs))
     return {"rows": rows, "threads": 1, "peer": f"OpenCV {cv2.__version__}"}
 
 
@@ -97,7 +93,7 @@ def scene(first: Bytes, second: Bytes) -> Scene:
     return Scene(first, second, detect(second, THRESHOLD), templates, at)
 
 
-def measure(name: str, given: Scene, backend: str, quick: bool) -> list[dict[str, Any]]:
+def measure(name: str, given: Scene, backend: str, quick: bool) -> list[Row]:
     """All rows of one pair of images."""
     repeats = 3 if quick else 15
     counts = f"{len(given.corners.xy)} corners, {len(given.xy)} points"

@@ -31,7 +31,7 @@ import numpy as np
 
 from vslam_ref.bench.filterpy_peer import WAYS, filterpy_step
 from vslam_ref.bench.imports import imports
-from vslam_ref.bench.rows import Row, each_backend, row
+from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.filters.carleman_ekf import carleman_ekf
 from vslam_ref.filters.ekf_slam import EkfSlam, ekf_predict_in_place, ekf_update_in_place
 from vslam_ref.filters.estimates import SlamFilter
@@ -55,11 +55,8 @@ GOALS_EKF_3 = {
 
 def run(quick: bool = False) -> dict[str, Any]:
     """Measure everything on one thread; ``rows`` is a list of flat records, one per figure."""
-    rows: list[Row] = []
-    for backend in each_backend():
-        rows += steps(backend, quick) + cycles(backend, quick) + study(backend, quick)
-    rows += imports(quick)
-    return {"rows": rows, "paper_pose_step_ratio": PAPER_POSE_RATIO, "threads": 1}
+    parts = on_each_backend(quick, steps, cycles, study) | {"imports": lambda: imports(quick)}
+    return {"rows": measured("filters", parts), "paper_pose_step_ratio": PAPER_POSE_RATIO, "threads": 1}
 
 
 def steps(backend: str, quick: bool) -> list[Row]:
@@ -72,7 +69,7 @@ def steps(backend: str, quick: bool) -> list[Row]:
         things |= {f"filterpy, {way}": filterpy_step(world, way) for way in ways}
         result = paired(things, 3 if quick else 9)
         seconds[n] = result.seconds["ours"]
-        rows.append(row("EKF-1", f"step, n = {n}", backend, 1e6 * seconds[n], "us"))
+        rows.append(row("EKF-1", f"step, n = {n}", backend, 1e6 * seconds[n], "µs"))
         goal = GOALS_EKF_1[n] if backend == "numpy" else GOAL_EKF_1_NUMBA
         for name in list(things)[1:]:
             bound = goal if name == "filterpy, users" else None

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.bench.rows import Row, each_backend, row
+from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.datasets import carmen, catalogue
 from vslam_ref.grids import MapConfig, StaticDynamicMap, static_dynamic
 from vslam_ref.grids.log_odds import log_odds
@@ -40,9 +40,7 @@ LOGS = ("intel", "aces", "csail", "edmonton", "fhw", "freiburg-079")
 
 def run(quick: bool = False) -> dict[str, Any]:
     """Measure everything on one thread; ``rows`` is a list of flat records."""
-    rows: list[Row] = []
-    for backend in each_backend():
-        rows += one_scan(backend, quick) + real_logs(backend, quick)
+    rows = measured("grids", on_each_backend(quick, one_scan, real_logs))
     return {"rows": rows, "threads": 1, "peer": "Bresenham loops in plain Python"}
 
 

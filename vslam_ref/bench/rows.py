@@ -1,9 +1,10 @@
-"""Measured figures as flat records, each with its goal and whether it is met; the backends they are for."""
+"""Measured figures as flat records, each with its goal and whether it is met; the parts that measure them."""
 
 from __future__ import annotations
 
+import functools
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -11,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from vslam_ref import _kernels
 
 Row = dict[str, Any]
+Part = Callable[[], list[Row]]
 
 
 def row(
@@ -55,6 +57,34 @@ def row(
 def backends() -> list[str]:
     """Backends that are there: ``numpy``, and ``numba`` where it is installed."""
     return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
+
+
+def measured(suite: str, parts: Mapping[str, Part]) -> list[Row]:
+    """Rows of all parts, in turn; on a terminal a line on stderr says which part is being measured.
+
+    Examples
+    --------
+    >>> [r["value"] for r in measured("toy", {"one": lambda: [row("G-1", "one", "-", 1.0, "s")]})]
+    [1.0]
+    """
+    from tqdm import tqdm
+
+    rows: list[Row] = []
+    with tqdm(parts.items(), desc=suite, unit=" parts", leave=False, disable=None) as bar:
+        for name, part in bar:
+            bar.set_postfix_str(name)
+            rows += part()
+    return rows
+
+
+def on_each_backend(quick: bool, *parts: Callable[[str, bool], list[Row]]) -> dict[str, Part]:
+    """Name -> part, for all parts with every backend: one thread, and the backend in use while it runs."""
+
+    def on(backend: str, part: Callable[[str, bool], list[Row]]) -> list[Row]:
+        with threadpool_limits(1), _kernels.use_backend(backend):
+            return part(backend, quick)
+
+    return {f"{p.__name__}, {b}": functools.partial(on, b, p) for b in backends() for p in parts}
 
 
 def each_backend() -> Iterator[str]:

@@ -134,7 +134,10 @@ def _print_outcome(outcome: Outcome) -> None:
 
     for claim in sorted(outcome.claims, key=lambda c: WORST_FIRST.index(c.verdict)):
         print("\n".join(_claim_lines(outcome.experiment.id, claim)))
-    print(f"{outcome.experiment.id}: {outcome.seconds:.1f} s, files in {outcome.folder}", flush=True)
+    took = f"{outcome.seconds:.1f} s"
+    if outcome.shares_with is not None:
+        took = f"shares its runs with {outcome.shares_with}"
+    print(f"{outcome.experiment.id}: {took}, files in {outcome.folder}", flush=True)
 
 
 def _claim_lines(experiment: str, claim: Claim) -> list[str]:
@@ -167,6 +170,7 @@ def _numbers(outcomes: Sequence[Outcome], out: Path) -> dict[str, Any]:
                 "runs": o.runs,
                 "quick": o.quick,
                 "seconds": o.seconds,
+                "shares_with": o.shares_with,
                 "folder": str(o.folder),
                 "claims": [claim.to_dict() for claim in o.claims],
             }

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.features.pyramid import Bytes
+from vslam_ref.features.levels import Bytes
 
 CIRCLE = [(0, 3), (1, 3), (2, 2), (3, 1), (3, 0), (3, -1), (2, -2), (1, -3)]
 CIRCLE += [(-x, -y) for x, y in CIRCLE]

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.features.pyramid import Bytes, grey
-from vslam_ref.features.segment_test import Pixels, corner_score, pixels, segment_test
+from vslam_ref.features.fast import Pixels, corner_score, pixels, segment_test
+from vslam_ref.features.levels import Bytes, grey
 
 HALF = 3
 """The window of the structure tensor reaches so far to each side: 7 x 7 pixels, as in PTAM."""
@@ -93,7 +93,7 @@ def detect(image: ArrayLike, threshold: int = 10, arc: int = 10, *, suppress: bo
     Raises
     ------
     ValueError
-        As :func:`~vslam_ref.features.segment_test.segment_test`.
+        As :func:`~vslam_ref.features.fast.segment_test`.
 
     Examples
     --------

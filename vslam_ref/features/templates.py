@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
-from vslam_ref.features.pyramid import LEVELS, Bytes, grey
+from vslam_ref.features.levels import LEVELS, Bytes, grey
 
 BEFORE, AFTER = 4, 3
 """A patch reaches from ``BEFORE`` pixels left of and above its pixel to ``AFTER`` on the other sides."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.features.segment_test import CIRCLE
+from vslam_ref.features.fast import CIRCLE
 from vslam_ref.plot import style
 
 Bytes = NDArray[np.uint8]

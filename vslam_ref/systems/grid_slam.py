@@ -84,11 +84,6 @@ class ScanStep(NamedTuple):
     chosen: IntArray
     withdrawn: list[Landmark]
 
-    @property
-    def pose(self) -> Array:
-        """Short for ``T_world_robot``."""
-        return self.T_world_robot
-
 
 class GridSlam:
     """SLAM with grids and landmarks, from a known start.
@@ -114,7 +109,7 @@ class GridSlam:
     >>> slam = GridSlam([0.0, 0.0, 0.0])
     >>> beams = np.deg2rad(np.arange(-90.0, 91.0))
     >>> step = slam.step(None, Scan(beams, np.full(181, 3.0), 10.0, 0.0))
-    >>> step.pose
+    >>> step.T_world_robot
     array([0., 0., 0.])
     """
 

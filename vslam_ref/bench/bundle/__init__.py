@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 
 from vslam_ref import _kernels
 from vslam_ref.bench.bundle import peers
-from vslam_ref.bench.rows import Row, backends, each_backend, row
+from vslam_ref.bench.rows import Part, Row, backends, each_backend, measured, row
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.bundle_files import read_bal
 from vslam_ref.estimation.bundle import BundleProblem, Options, Scene, bundle_adjust
@@ -73,13 +73,15 @@ def run(quick: bool = False) -> dict[str, Any]:
         if backend == "numba":
             _kernels.warm("bundle", "bundle_schur")
         bundle_adjust(chain(5), options=Options(max_iterations=2))
+    sizes, few = (25, 50, 100, 200), 2 if quick else 7
+    parts: dict[str, Part] = {"SciPy": lambda: against_scipy(problems, 1 if quick else 7)}
+    if "pyceres" not in peers.missing():
+        parts["Ceres"] = lambda: against_ceres(problems, few)
+        parts["steps"] = lambda: steps_to_best((20,) if quick else sizes)
+    parts["growth"] = lambda: growth((10, 20) if quick else sizes, few)
+    parts["memory"] = lambda: memory(20 if quick else 200)
     with threadpool_limits(1):
-        rows = against_scipy(problems, 1 if quick else 7)
-        if "pyceres" not in peers.missing():
-            rows += against_ceres(problems, 2 if quick else 7)
-            rows += steps_to_best((20,) if quick else (25, 50, 100, 200))
-        rows += growth((10, 20) if quick else (25, 50, 100, 200), 2 if quick else 7)
-    rows += memory(20 if quick else 200)
+        rows = measured("bundle", parts)
     return {"rows": rows, "threads": 1, "missing peers": ", ".join(peers.missing()) or "none"}
 
 

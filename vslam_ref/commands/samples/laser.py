@@ -41,8 +41,8 @@ true:   x y theta of every line is the laser's true pose; odom_* is what noisy w
 def make(folder: Path, rng: np.random.Generator) -> Made:
     """Write the log, the walls and the people."""
     recording = simulate(CONFIG, rng)
-    wheels = drive(recording.poses[0], recording.odometry.increment)
-    carmen.write(folder / "office.log", recording.poses, wheels, recording.ranges, recording.times)
+    wheels = drive(recording.T_world_robot[0], recording.odometry.increment)
+    carmen.write(folder / "office.log", recording.T_world_robot, wheels, recording.ranges, recording.times)
     fixed = recording.segments[0][recording.segment_owner == 0]
     _write_csv(folder / "walls.csv", "ax_m,ay_m,bx_m,by_m", fixed.tolist())
     _write_csv(folder / "people.csv", "time_s,person,x_m,y_m", _people(recording))
@@ -50,7 +50,7 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
         "scans": len(recording.times),
         "people": recording.people.shape[1],
         "seconds": float(recording.times[-1]),
-        "wheels_end_off_m": float(np.hypot(*(wheels[-1] - recording.poses[-1])[:2])),
+        "wheels_end_off_m": float(np.hypot(*(wheels[-1] - recording.T_world_robot[-1])[:2])),
     }
     command = "vslam-ref grid samples/laser/office.log --out out/office"
     return Made(README, (command, f"{command} --resolution 0.05 --set video_frames=0"), known)

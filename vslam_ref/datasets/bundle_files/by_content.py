@@ -6,6 +6,7 @@ from pathlib import Path
 
 from vslam_ref.datasets.bundle_files.bal import read_bal, write_bal
 from vslam_ref.datasets.bundle_files.bundler import read_bundler
+from vslam_ref.datasets.bundle_files.colmap import FILES as COLMAP_FILES
 from vslam_ref.datasets.bundle_files.colmap import read_colmap, write_colmap
 from vslam_ref.datasets.bundle_files.libmv import ORDERS, SPACES, read_libmv
 from vslam_ref.datasets.bundle_files.ply import write_ply
@@ -14,6 +15,8 @@ from vslam_ref.datasets.text import FormatError, read_bytes
 
 READERS = {"bal": read_bal, "bundler": read_bundler, "libmv": read_libmv, "colmap": read_colmap}
 RIGHT = "expected BAL (three counts), Bundler (# Bundle file v0.3), libmv (vP…), or a folder of COLMAP's text"
+ALONE = "BAL, Bundler and libmv are single files"
+FOLDERS = f"a folder must hold COLMAP's text model, {', '.join(COLMAP_FILES)}"
 
 
 def detect(path: Path | str) -> str:
@@ -26,6 +29,8 @@ def detect(path: Path | str) -> str:
     """
     path = Path(path)
     if path.is_dir():
+        if not any((path / name).exists() for name in COLMAP_FILES):
+            raise FormatError(path, None, f"{_of_folder(path)}; {FOLDERS}; {ALONE}")
         return "colmap"
     if not path.exists():
         raise FormatError(path, None, "no such file or folder")
@@ -39,6 +44,15 @@ def detect(path: Path | str) -> str:
         return "bal"
     shown = head[:24].decode("ascii", "backslashreplace") if head else "nothing"
     raise FormatError(path, None, f"begins with {shown!r}; {RIGHT}")
+
+
+def _of_folder(path: Path) -> str:
+    """What a folder holds that is not COLMAP's text, in words."""
+    if (path / "cameras.bin").exists():
+        return "a COLMAP model in its binary form (colmap model_converter --output_type TXT makes the text)"
+    names = sorted(entry.name for entry in path.iterdir())
+    shown = ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
+    return f"a folder with {shown}" if names else "an empty folder"
 
 
 def read_bundle(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:

@@ -70,9 +70,9 @@ class Board:
         """
         found = re.fullmatch(r"(\d{1,3})[xX](\d{1,3})", text.strip())
         if found is None:
-            raise ValueError(
-                f"board {text!r}: expected inner corners along a row, 'x', and along a column, as 9x6"
-            )
+            numbers = re.findall(r"\d{1,3}", text)
+            right = "x".join(numbers) if len(numbers) == 2 else "9x6"
+            raise ValueError(f"board {text!r}: write {right}, inner corners along a row, then along a column")
         return cls(int(found[1]), int(found[2]), square)
 
     @property

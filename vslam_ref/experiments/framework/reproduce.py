@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ class Outcome:
     runs: int | None
     seconds: float
     quick: bool = False
+    shares_with: str | None = None
+    """The experiment whose runs were used again: ``seconds`` has no simulation in it then."""
 
 
 def reproduce(
@@ -66,7 +68,7 @@ def reproduce(
     """
     out = files.require_folder(out)
     files.clean(out)
-    shared: tuple[Any, Study[Any], Kept] | None = None
+    shared: tuple[Any, Study[Any], Kept, str] | None = None
     for number, (experiment, config) in enumerate(work, 1):
         if begin is not None:
             begin(number, experiment)
@@ -76,9 +78,10 @@ def reproduce(
             if shared is not None:
                 shared[2].remove()
             kept = kept_beside(out, experiment.id, config_to_dict(config), _kernels.backend())
-            shared = same, experiment.run(config, context, kept), kept
+            shared = same, experiment.run(config, context, kept), kept, experiment.id
         seconds = time.perf_counter() - start
-        yield _write(experiment, shared[1], out, seconds, quick)
+        first = shared[3] if shared[3] != experiment.id else None
+        yield replace(_write(experiment, shared[1], out, seconds, quick), shares_with=first)
     if shared is not None:
         shared[2].remove()
 

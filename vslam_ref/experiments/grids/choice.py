@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.grids.beams import increment_of, scan_of
 from vslam_ref.geometry import se2, so2
 from vslam_ref.grids import MapConfig
 from vslam_ref.grids.landmarks import LandmarkConfig
@@ -91,7 +90,7 @@ def seen_to_be_gone(recording: Recording, born: int, row: int, end: int) -> bool
     moved = np.hypot(*(ends - ends[0]).T) > MOVED
     looked = 0
     for k in born + np.flatnonzero(moved):
-        seen = se2.act(se2.inverse(recording.poses[k]), ends[0])
+        seen = se2.act(se2.inverse(recording.T_world_robot[k]), ends[0])
         distance, bearing = np.hypot(*seen), np.arctan2(seen[1], seen[0])
         off = np.abs(so2.wrap(recording.angles - bearing))
         i = int(np.argmin(off))
@@ -101,15 +100,16 @@ def seen_to_be_gone(recording: Recording, born: int, row: int, end: int) -> bool
 
 def follow(recording: Recording, config: GridSlamConfig) -> tuple[float, list[float]]:
     """Position error of one mode, and the counts of :class:`Run` in its order."""
-    slam = GridSlam(recording.poses[0], config)
+    slam = GridSlam(recording.T_world_robot[0], config)
     off, birth = np.empty(len(recording)), {}
     for k in range(len(recording)):
-        step = slam.step(increment_of(recording, k), scan_of(recording, k))
-        off[k] = np.hypot(*(step.pose - recording.poses[k])[:2])
+        step = slam.step(recording.increment(k), recording.scan(k))
+        off[k] = np.hypot(*(step.T_world_robot - recording.T_world_robot[k])[:2])
         for number in step.chosen:
             place = slam.places()[[m.id for m in slam.landmarks.active].index(number)]
-            seen = se2.act(se2.inverse(step.pose), place)  # where the robot sees it, put into the true world
-            birth[int(number)] = (k, *corner_owner(recording, k, se2.act(recording.poses[k], seen)))
+            # where the robot sees it, put into the true world
+            seen = se2.act(se2.inverse(step.T_world_robot), place)
+            birth[int(number)] = (k, *corner_owner(recording, k, se2.act(recording.T_world_robot[k], seen)))
     fixed = len(recording.plan.fixed)
     counts = [float(len(birth)), 0.0, 0.0, 0.0, 0.0]
     for mark in slam.landmarks.landmarks:

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
-from vslam_ref.experiments.grids.beams import scan_of
 from vslam_ref.grids import InverseSensor, LogOddsGrid, MapConfig, PlainMap, StaticDynamicMap
 from vslam_ref.grids.log_odds import OCCUPIED
 from vslam_ref.worlds.floor_plan import (
@@ -141,9 +140,9 @@ def measure(recording: Recording, config: SeparationConfig) -> Counts:
     met, ended = np.zeros(cells.shape, dtype=int), np.zeros(cells.shape, dtype=int)
     last, moving = np.zeros(cells.shape, dtype=bool), np.zeros(4)
     for k in range(len(recording)):
-        scan = scan_of(recording, k)
-        separated.update(recording.poses[k], scan)
-        plain.update(recording.poses[k], scan)
+        scan = recording.scan(k)
+        separated.update(recording.T_world_robot[k], scan)
+        plain.update(recording.T_world_robot[k], scan)
         truth, seen = cell_truth(recording, k, cells), seen_cells(recording, k, cells)
         now = seen.crossed | seen.ended
         met += now

@@ -20,13 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.experiments.grids.beams import increment_of, scan_of
 from vslam_ref.geometry import se2
-from vslam_ref.grids import MapConfig, Scan, StaticDynamicMap
+from vslam_ref.grids import MapConfig, StaticDynamicMap
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
 from vslam_ref.systems.grid_slam import GridSlam, GridSlamConfig
 from vslam_ref.worlds import floor_plan
-from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, Recording
+from vslam_ref.worlds.floor_plan import FloorPlanConfig, LaserConfig, LaserScan, Recording
 
 MODES = ("separated", "plain", "ideal")
 MATCHERS = ("robust", "squares")
@@ -143,9 +142,9 @@ def f_score(counts: Array) -> Array:
     return score
 
 
-def without_moving(recording: Recording, k: int) -> Scan:
+def without_moving(recording: Recording, k: int) -> LaserScan:
     """Scan k without the beams that end on something that moves, by the truth."""
-    scan, owner = scan_of(recording, k), recording.owner[k]
+    scan, owner = recording.scan(k), recording.owner[k]
     moves = (owner >= 0) & recording.moving[k, np.maximum(owner, 0)]
     return scan._replace(ranges=np.where(moves, np.nan, scan.ranges))
 
@@ -154,11 +153,11 @@ def localise(
     recording: Recording, config: GridSlamConfig, warm_up: int = 25, ideal: bool = False
 ) -> tuple[Array, Array, GridSlam]:
     """Estimated poses (n, 3), beam counts (3,) of D after ``warm_up`` scans (0 for a plain grid), loop."""
-    slam = GridSlam(recording.poses[0], config)
-    poses, beams = np.empty_like(recording.poses), np.zeros(3)
+    slam = GridSlam(recording.T_world_robot[0], config)
+    poses, beams = np.empty_like(recording.T_world_robot), np.zeros(3)
     for k in range(len(recording)):
-        scan = without_moving(recording, k) if ideal else scan_of(recording, k)
-        poses[k] = slam.step(increment_of(recording, k), scan).pose
+        scan = without_moving(recording, k) if ideal else recording.scan(k)
+        poses[k] = slam.step(recording.increment(k), scan).T_world_robot
         if isinstance(slam.maps, StaticDynamicMap) and k >= warm_up:
             beams += beam_counts(recording, k, poses[k], slam.maps)
     return poses, beams, slam
@@ -176,8 +175,8 @@ def spoiled_counts(
     maps, total = StaticDynamicMap(config), np.zeros(3)
     errors = sigma * rng.standard_normal((len(recording), 3)) / [1.0, 1.0, lever]
     for k in range(len(recording)):
-        pose = recording.poses[k] + errors[k]
-        maps.update(pose, scan_of(recording, k))
+        pose = recording.T_world_robot[k] + errors[k]
+        maps.update(pose, recording.scan(k))
         if k >= warm_up:
             total += beam_counts(recording, k, pose, maps)
     return total
@@ -185,7 +184,7 @@ def spoiled_counts(
 
 def position_errors(recording: Recording, poses: Array) -> tuple[float, float]:
     """Root mean square over the run, and at its end, metres."""
-    off = np.hypot(*(poses - recording.poses)[:, :2].T)
+    off = np.hypot(*(poses - recording.T_world_robot)[:, :2].T)
     return float(np.sqrt(np.mean(off**2))), float(off[-1])
 
 

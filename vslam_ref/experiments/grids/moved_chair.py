@@ -18,7 +18,6 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
-from vslam_ref.experiments.grids.beams import scan_of
 from vslam_ref.grids import LogOddsGrid, MapConfig, StaticDynamicMap
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS
 from vslam_ref.worlds import floor_plan
@@ -132,7 +131,7 @@ def simulate(config: ChairConfig, point: None, seed: np.random.SeedSequence) -> 
         hit = seen.ended & on_new if recording.times[k] >= config.put_down else np.zeros_like(on_new)
         through = seen.crossed & ~seen.ended & on_old
         for v, grid in enumerate(both):
-            grid.update(recording.poses[k], scan_of(recording, k))
+            grid.update(recording.T_world_robot[k], recording.scan(k))
             s, d = _decided(grid.static(), middles), _decided(grid.dynamic(), middles)
             if hit.any():
                 static[v, k], dynamic[v, k] = s[hit].mean(), d[hit].mean()

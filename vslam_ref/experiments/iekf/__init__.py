@@ -8,8 +8,8 @@ module                        holds
 ``rules``                     sizes of effect words, worlds in which a claim is false, the rule
 ``naive``                     the sentences read pointwise, reported beside the rules
 ``worlds``                    draws of runs, and worlds in which a claim is false
-``evaluate``                  thresholds, shares, intervals and null rates of many claims in one pass
-``judge``                     the verdict rule, and the door: per-run arrays in, claims out
+``evaluation``                thresholds, shares, intervals and null rates of many claims in one pass
+``verdicts``                  the verdict rule, and the door: per-run arrays in, claims out
 ``study``, ``figures``        the Monte Carlo study; figures 2, 3 and 4
 ``grid``, ``settings``        the settings of ``sensitivity``, and one of them run and judged
 ``grid_rules``                what the grid as a whole says
@@ -18,8 +18,8 @@ module                        holds
 ============================  =====================================================================
 """
 
-from vslam_ref.experiments.iekf.judge import StudyArrays, all_at_once, conclude, evaluate, judge
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence, claim_ids, rules_table
+from vslam_ref.experiments.iekf.verdicts import StudyArrays, all_at_once, conclude, evaluate, judge
 
 __all__ = [
     "SENTENCES",

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, batches, judged
 from vslam_ref.experiments.iekf import neighbours
-from vslam_ref.experiments.iekf.judge import TELLING
 from vslam_ref.experiments.iekf.neighbours import SETTLE, Errors
 from vslam_ref.experiments.iekf.study import noises
+from vslam_ref.experiments.iekf.verdicts import TELLING
 from vslam_ref.filters import vehicle
 from vslam_ref.metrics.consistency import percentile_interval, resample_weights, subset_weights
 from vslam_ref.worlds.circle import Circle, CircleConfig, make_circle

@@ -15,7 +15,6 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study
-from vslam_ref.experiments.iekf.judge import StudyArrays, judge
 from vslam_ref.experiments.iekf.sentences import claim_ids
 from vslam_ref.experiments.iekf.study import (
     QUICK,
@@ -28,6 +27,7 @@ from vslam_ref.experiments.iekf.study import (
     simulate,
     study_field,
 )
+from vslam_ref.experiments.iekf.verdicts import StudyArrays, judge
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

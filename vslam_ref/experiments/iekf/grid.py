@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vslam_ref.experiments.iekf.judge import CONTROL_STUDIES, POPULATION_STUDIES
 from vslam_ref.experiments.iekf.study import QUICK as STUDY_QUICK
 from vslam_ref.experiments.iekf.study import StudyConfig
+from vslam_ref.experiments.iekf.verdicts import CONTROL_STUDIES, POPULATION_STUDIES
 
 BASELINE = "baseline"
 

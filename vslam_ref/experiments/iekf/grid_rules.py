@@ -15,10 +15,10 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, judged
 from vslam_ref.experiments.iekf.grid import BASELINE, NUMERIC
-from vslam_ref.experiments.iekf.judge import LEAST_STUDY
 from vslam_ref.experiments.iekf.rules import APART
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
 from vslam_ref.experiments.iekf.settings import Grid, Judged
+from vslam_ref.experiments.iekf.verdicts import LEAST_STUDY
 from vslam_ref.metrics.consistency import bootstrap_interval, percentile_interval, resample_weights
 
 GAP = (

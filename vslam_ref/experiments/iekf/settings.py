@@ -12,10 +12,10 @@ from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Study, Verdict
 from vslam_ref.experiments.iekf.figures import study_arrays
 from vslam_ref.experiments.iekf.grid import BASELINE, SensitivityConfig, Setting, settings_of
-from vslam_ref.experiments.iekf.judge import judge
 from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.sentences import SENTENCES, claim_ids
 from vslam_ref.experiments.iekf.study import StudyConfig, run_study
+from vslam_ref.experiments.iekf.verdicts import judge
 
 
 class Judged(NamedTuple):

@@ -79,7 +79,7 @@ def open_source(dataset: str, robot: int | None) -> Source:
     ValueError
         If nothing is found, or a file is not as it should be.
     """
-    kind, folder = _locate(dataset)
+    kind, folder = locate(dataset)
     if kind == "victoria_park":
         if robot is not None:
             raise InputError(f"--robot {robot}: Victoria Park has one vehicle; leave it out")
@@ -93,8 +93,8 @@ def open_source(dataset: str, robot: int | None) -> Source:
     return Source(kind, robot, log, mrclam.read_truth(folder, robot, log) if has_truth else None)
 
 
-def _locate(dataset: str) -> tuple[str, Path]:
-    """Format and folder of a data set."""
+def locate(dataset: str) -> tuple[str, Path]:
+    """Format, ``mrclam`` or ``victoria_park``, and folder of a data set; ``InputError`` if there is none."""
     for name, folder_name in SETS.items():
         if dataset in (name, folder_name):
             return name, catalogue.require(folder_name)

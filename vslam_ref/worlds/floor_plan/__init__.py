@@ -33,7 +33,7 @@ from vslam_ref.worlds.floor_plan.cells import Cells, cells_on_segments, disc_cel
 from vslam_ref.worlds.floor_plan.config import CrowdConfig, FloorPlanConfig, LaserConfig, RobotConfig
 from vslam_ref.worlds.floor_plan.plan import Box, Door, FloorPlan, hall, office
 from vslam_ref.worlds.floor_plan.rays import Hits, cast
-from vslam_ref.worlds.floor_plan.recording import Recording, Surfaces, simulate, turned
+from vslam_ref.worlds.floor_plan.recording import LaserScan, Recording, Surfaces, simulate, turned
 from vslam_ref.worlds.floor_plan.truth import CellTruth, Seen, cell_truth, cover, seen_cells
 
 __all__ = [
@@ -46,6 +46,7 @@ __all__ = [
     "FloorPlanConfig",
     "Hits",
     "LaserConfig",
+    "LaserScan",
     "Recording",
     "RobotConfig",
     "Seen",

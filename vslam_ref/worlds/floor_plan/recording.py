@@ -106,11 +106,6 @@ class Recording:
         """What stands on the floor at scan k."""
         return Surfaces(self.segments[k], self.segment_owner, self.discs[k], self.disc_owner)
 
-    @property
-    def poses(self) -> Array:
-        """Short for ``T_world_robot``."""
-        return self.T_world_robot
-
     def scan(self, k: int) -> LaserScan:
         """Scan k as it was measured."""
         return LaserScan(self.angles, self.ranges[k], self.config.laser.max_range, float(self.times[k]))

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.features.corners import shi_tomasi
-from vslam_ref.features.pyramid import finest_from_level, halve, level_from_finest
-from vslam_ref.features.search import zmssd, zncc
-from vslam_ref.features.segment_test import corner_score, segment_test
+from vslam_ref.features.fast import corner_score, segment_test
+from vslam_ref.features.levels import finest_from_level, halve, level_from_finest
+from vslam_ref.features.patch_search import zmssd, zncc
 from vslam_ref.features.templates import sampling, warp
 
 Array = NDArray[Any]

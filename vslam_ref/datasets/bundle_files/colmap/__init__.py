@@ -18,7 +18,7 @@ is ``Fov``; the formulas are the same, coefficient by coefficient.  No problem h
 Features without a point are left out and counted in ``notes``.
 """
 
-from vslam_ref.datasets.bundle_files.colmap.reading import read_colmap
+from vslam_ref.datasets.bundle_files.colmap.reading import FILES, read_colmap
 from vslam_ref.datasets.bundle_files.colmap.writing import write_colmap
 
-__all__ = ["read_colmap", "write_colmap"]
+__all__ = ["FILES", "read_colmap", "write_colmap"]

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import IntArray
-from vslam_ref.features.pyramid import Bytes, grey
+from vslam_ref.features.levels import Bytes, grey
 
 Pixels = NDArray[np.int32]
 Levels = NDArray[Any]

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, as_array
-from vslam_ref.features.pyramid import Bytes, grey
+from vslam_ref.features.levels import Bytes, grey
 from vslam_ref.features.templates import BEFORE, SIDE, bilinear
 
 INNER = SIDE - 2

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray, as_array
 from vslam_ref.features.corners import Corners
-from vslam_ref.features.pyramid import Bytes, grey
-from vslam_ref.features.segment_test import Pixels
+from vslam_ref.features.fast import Pixels
+from vslam_ref.features.levels import Bytes, grey
 from vslam_ref.features.templates import AFTER, BEFORE, SIDE
 
 MEASURES = ("zmssd", "zncc")

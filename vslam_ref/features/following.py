@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.features.corners import Corners
-from vslam_ref.features.pyramid import Bytes
-from vslam_ref.features.refine import refine
-from vslam_ref.features.search import LIMIT, search
+from vslam_ref.features.levels import Bytes
+from vslam_ref.features.patch_search import LIMIT, search
+from vslam_ref.features.refinement import refine
 from vslam_ref.features.templates import warp
 
 HOME = 1.5
@@ -70,7 +70,7 @@ def follow(
     guess : array_like, shape (N, 2), optional
         Where to look in the second image; by default where the points were.
     limit : float
-        As for :func:`~vslam_ref.features.search.search`.
+        As for :func:`~vslam_ref.features.patch_search.search`.
     home : float
         Pixels; infinity leaves out the way back.
 

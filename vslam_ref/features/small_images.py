@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.features.pyramid import finest_from_level, grey, halve
+from vslam_ref.features.levels import finest_from_level, grey, halve
 from vslam_ref.features.templates import bilinear
 from vslam_ref.geometry import se2
 from vslam_ref.geometry.cameras import Camera

@@ -28,7 +28,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, judged
-from vslam_ref.experiments.iekf.evaluate import Evaluation, evaluate_all
+from vslam_ref.experiments.iekf.evaluation import Evaluation, evaluate_all
 from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
