@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features import corner_score, detect, is_peak, pyramid, shi_tomasi, small_image
 from vslam_ref.features.corners import HALF
-from vslam_ref.features.small_image import LEAST_SIDE
+from vslam_ref.features.small_images import LEAST_SIDE
 from vslam_ref.systems.ptam.settings import FeatureSettings
 from vslam_ref.systems.visual_map import Picture
 

@@ -19,7 +19,7 @@ from vslam_ref.features import (
     warp,
     zmssd,
 )
-from vslam_ref.features.search import AREA, LIMIT, variation
+from vslam_ref.features.patch_search import AREA, LIMIT, variation
 from vslam_ref.systems.visual_map.visibility import Visible, sources, templates
 from vslam_ref.systems.visual_map.visual_map import Bytes, Picture, VisualMap
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import finest_from_level, level_sigma, zmssd
-from vslam_ref.features.search import AREA, variation
+from vslam_ref.features.patch_search import AREA, variation
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera
