@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from vslam_ref._kernels._signature import kernel, njit
+from vslam_ref._kernels._signature import given, kernel, njit
 
 NEAR, BACKGROUND, PROBES = 0.01, 96.0, 4
 
@@ -23,7 +23,7 @@ def _pair(ndim):
     return types.Tuple((types.Array(types.int32, ndim, "C"), types.Array(types.float64, ndim, "C")))
 
 
-@kernel(NUMBERS3, NUMBERS3, NUMBERS2, INTEGERS2, returns=_pair(2))
+@kernel(given(3), NUMBERS3, NUMBERS2, INTEGERS2, returns=_pair(2))
 def nearest(xn, homography, extent, box):
     """Twin of :func:`vslam_ref.worlds.rendered.raster.nearest`."""
     quad = np.full(xn.shape[:2], -1, np.int32)
@@ -43,7 +43,7 @@ def nearest(xn, homography, extent, box):
     return quad, inverse_depth
 
 
-@kernel(NUMBERS2, INTEGERS1, INTEGERS1, NUMBERS3, NUMBERS2, INTEGERS2, returns=_pair(1))
+@kernel(given(2), INTEGERS1, INTEGERS1, NUMBERS3, NUMBERS2, INTEGERS2, returns=_pair(1))
 def nearest_of(xn, column, row, homography, extent, box):
     """Twin of :func:`vslam_ref.worlds.rendered.raster.nearest_of`."""
     quad = np.full(xn.shape[0], -1, np.int32)
@@ -113,7 +113,7 @@ def _sample(texels, table, t, level, a, b):
     return fine
 
 
-@kernel(NUMBERS2, NUMBERS3, QUADS, NUMBERS3, INTEGERS1, NUMBERS1, BYTES, INTEGERS3,
+@kernel(given(2), NUMBERS3, QUADS, NUMBERS3, INTEGERS1, NUMBERS1, BYTES, INTEGERS3,
         returns=types.Array(types.float64, 1, "C"))  # fmt: skip
 def shade(xn, spread, quad, homography, texture, light, texels, table):
     """Twin of :func:`vslam_ref.worlds.rendered.raster.shade`."""

@@ -36,7 +36,7 @@ def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
 
 
 def add_wall(b: Builder, start: list[float], along: list[float], length: float, inwards: list[float]) -> None:
-    """A wall in panels, seen from the side ``inwards`` (3,), with posters and doors before it."""
+    """Add a wall of ``length`` metres, seen from the side ``inwards`` (3,), with posters and doors."""
     way, normal = np.array(along), np.array(inwards)
     right = way if np.cross(way, [0, 0, 1.0]) @ normal > 0 else -way
     at = 0.0

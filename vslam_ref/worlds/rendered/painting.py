@@ -66,7 +66,7 @@ def _enlarged(grid: Array, shape: tuple[int, int], size: tuple[float, float]) ->
 
 
 def finished(grey: ArrayLike) -> Bytes:
-    """Grey values as bytes, rounded and kept within 0 to 255."""
+    """Grey values (H, W), no unit, as bytes: rounded and kept within 0 to 255."""
     return np.floor(np.clip(grey, 0, 255) + 0.5).astype(np.uint8)
 
 
@@ -108,7 +108,7 @@ def shapes(
 
 
 def wood(rng: Rng, shape: tuple[int, int], grey: float = 150.0) -> Bytes:
-    """Grain along the columns' direction, with scratches and stains."""
+    """Grain along the columns' direction, with marks; (H, W), mean ``grey``, no unit."""
     grain = clouds(rng, shape, 24.0, 4, stretch=14.0)
     rings = np.sin(2.2 * clouds(rng, shape, 90.0, 3, stretch=9.0))
     marks = shapes(rng, shape, shape[0] * shape[1] // 5000, (1.2, 6.0), (-60.0, 60.0), 0.0)
@@ -116,14 +116,14 @@ def wood(rng: Rng, shape: tuple[int, int], grey: float = 150.0) -> Bytes:
 
 
 def speckled(rng: Rng, shape: tuple[int, int], grey: float, spread: float, per_texel: float = 4e-4) -> Bytes:
-    """A rough surface with flakes of all sizes: cloth, stone, plaster."""
+    """A rough surface with flakes of all sizes, as plaster: (H, W), ``grey`` +- ``spread``, no unit."""
     count = int(per_texel * shape[0] * shape[1])
     flakes = shapes(rng, shape, count, (1.3, 9.0), (grey - spread, grey + spread), grey)
     return finished(flakes + 0.15 * spread * clouds(rng, shape, 40.0, 4))
 
 
 def page(rng: Rng, shape: tuple[int, int], line: int = 14, paper: float = 225.0) -> Bytes:
-    """Printed paper: a heading, lines of words, and a figure."""
+    """Printed paper (H, W): a heading, lines of words, and a figure; ``paper`` is its grey value, no unit."""
     height, width = shape
     grey = paper + 3 * clouds(rng, shape, 120.0, 3)
     edge, body, letter = max(width // 12, 6), max(line // 2, 3), max(line // 4, 2)
@@ -270,7 +270,7 @@ def spines(rng: Rng, shape: tuple[int, int]) -> Bytes:
 
 
 def tiles(rng: Rng, shape: tuple[int, int], side: int, grey: float = 130.0) -> Bytes:
-    """Square tiles of ``side`` texels with dark joints, flecked, each of its own grey."""
+    """Square tiles of ``side`` texels with dark joints, flecked: (H, W), mean ``grey``, no unit."""
     v, u = np.indices(shape)
     own = rng.normal(0, 14, (shape[0] // side + 1, shape[1] // side + 1))[v // side, u // side]
     joint = np.minimum(v % side, u % side) < 2

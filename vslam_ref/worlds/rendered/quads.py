@@ -37,7 +37,7 @@ class Quads(NamedTuple):
 
 
 def quad(corner: ArrayLike, across: ArrayLike, down: ArrayLike, texture: int, light: float = 1.0) -> Quads:
-    """One parallelogram: corner (3,), and sides (3,) along the texture's columns and rows, metres."""
+    """One parallelogram: ``corner (3,)``, sides ``across (3,)`` and ``down (3,)`` of its texture, metres."""
     sides = np.stack([np.asarray(across, np.float64), np.asarray(down, np.float64)])
     return Quads(np.asarray([corner], np.float64), sides[None], np.array([texture]), np.array([light]))
 

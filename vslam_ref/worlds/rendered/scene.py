@@ -51,7 +51,7 @@ class Tracks(NamedTuple):
     uv : ndarray, shape (K, N, 2)
         Pixels; the principal point where the lens shows none.
     visible : ndarray of bool, shape (K, N)
-        Whether the point is inside the image and nothing is before it.
+        Whether the point is inside the image and nothing is before it; no unit.
     """
 
     uv: Array

@@ -103,7 +103,7 @@ def footprint(J: Array) -> Footprint:
 
 
 def sample(textures: Textures, which: IntArray, a: Array, b: Array, level: Array) -> Array:
-    """Grey values (N,) of textures ``which (N,)`` at columns a and rows b (N,), texels."""
+    """Grey values (N,) of textures ``which (N,)`` at columns ``a (N,)``, rows ``b (N,)``, ``level (N,)``."""
     low = np.floor(level).astype(np.int64)
     high = np.minimum(low + 1, LEVELS - 1)
     share = level - low
