@@ -7,8 +7,9 @@ from the scale, and the step :math:`\mu` from
 .. math:: \sum_j w_j\, \frac{J_j^T J_j}{\sigma_j^2}\; \mu
    = -\sum_j w_j\, \frac{J_j^T e_j}{\sigma_j^2}, \qquad T \leftarrow \operatorname{Exp}(\mu)\, T ,
 
-with e predicted minus measured.  It minimises :math:`\sum_j \rho(\lVert e_j \rVert / (\sigma \sigma_j))` over one
-pose, :func:`vslam_ref.estimation.resection.refine_pose` with a scale that follows the errors.
+with e predicted minus measured.  It minimises :math:`\sum_j \rho(\lVert e_j \rVert / (\sigma \sigma_j))` over
+one pose, as :func:`vslam_ref.estimation.resection.refine_pose` does, with a scale
+that follows the errors.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def track_pose(
     sigma_px : array_like, broadcast to (N,)
         Standard deviation of a coordinate up to a common factor: 2^level.
     loss : Loss, optional
-        For norms in units of the scale; Tukey's with its 95 % constant by default, ``L2()`` for least squares.
+        For norms in units of the scale; by default Tukey's with its 95 % constant, ``L2()`` for squares.
     steps : int
     least_sigma : float
         In units of ``sigma_px``.
