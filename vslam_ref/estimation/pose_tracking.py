@@ -126,7 +126,8 @@ def track_pose(
     end = _weighed(camera, X, u, root, T, rho, least_sigma)
     if end.reason:
         return TrackedPose(T, end.weights, end.sigma, np.diag(np.full(6, np.inf)), end.reason)
-    return TrackedPose(T, end.weights, end.sigma, end.sigma**2 * np.linalg.inv(end.H), "")
+    cov: Array = end.sigma**2 * np.linalg.inv(end.H)
+    return TrackedPose(T, end.weights, end.sigma, cov, "")
 
 
 class _Weighed(NamedTuple):
