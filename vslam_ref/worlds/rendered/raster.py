@@ -97,7 +97,7 @@ class Placed(NamedTuple):
 
 def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> Placed:
     """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is that of its :class:`Rays`."""
-    extent = textures.extent[quads.texture]
+    extent = np.ascontiguousarray(textures.extent[quads.texture])
     R = se3.rotation(T_cam_world)
     corner = se3.act(T_cam_world, quads.corner)
     side = quads.side @ R.T
