@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.features import corners
-from vslam_ref.features.pyramid import pyramid
+from vslam_ref.features.levels import pyramid
 from vslam_ref.geometry import se3
 from vslam_ref.support.errors import InputError
 from vslam_ref.worlds.rendered import NAMES, Effects, Scene, motion, painting, pinhole, raster, scene, wide
