@@ -43,7 +43,7 @@ def test_errata_claims_say_yes_and_no() -> None:
     assert claims["corrected-stays"].verdict == "reproduced"
     assert load("iekf-errata").figure(study).axes
 
-    def judge(data: dict[str, errata.Outcome]) -> dict[str, Claim]:
+    def judge(data: dict[str, errata.ErrataRun]) -> dict[str, Claim]:
         return by_id(errata.claims(replace(study, data=data)))
 
     # a false world: the printed filter's curves put in the corrected one's place, and the other way round

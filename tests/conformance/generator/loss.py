@@ -81,9 +81,7 @@ REGIMES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Five losses, three functions, four regimes, and the seam."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for name in COSTS:
         for flag, (low, high, count) in REGIMES.items():
             if name == "l2" and flag not in ("inside", "tiny"):
