@@ -67,14 +67,14 @@ def test_sigma_is_estimated_from_the_residuals(rng: np.random.Generator) -> None
 
 
 def test_repetition_scatters_as_predicted(rng: np.random.Generator) -> None:
-    """300 draws of the noise at one scene: the Mahalanobis lengths are chi-squared; false alarms 1e-4.
+    """120 draws of the noise at one scene: the Mahalanobis lengths are chi-squared; false alarms 1e-4.
 
     Noise of 0.05 pixels keeps what is not linear below a hundredth of a standard deviation.
     """
     problem, truth = make(rng, views=4, points=12, noise=0.0)
     problem = fix_gauge(hold(problem.at(truth), [], truth))
     seen = problem.seen
-    sigma, total, draws = 0.05, 0.0, 300
+    sigma, total, draws = 0.05, 0.0, 120
     exact = bundle_adjust(problem, options=TIGHT)
     found = covariance(exact, [1, 3], [4, 7], sigma=sigma)
     assert found.matrix is not None

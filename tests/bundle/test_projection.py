@@ -19,9 +19,9 @@ from .conftest import CAMERAS, make
 EPS = np.finfo(float).eps
 
 
-def parts(problem: BundleProblem) -> tuple[p.State, p.Links]:
+def parts(problem: BundleProblem) -> tuple[p.BundleState, p.Links]:
     T, seen = problem.scene.T_cam_world, problem.seen
-    state = p.State(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics)
+    state = p.BundleState(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics)
     return state, p.Links(seen.view, seen.point, problem.lens_of_view[seen.view], seen.uv)
 
 
@@ -58,7 +58,7 @@ def test_jacobians_are_derivatives(model: str, rng: np.random.Generator) -> None
 
     def residual(step: np.ndarray) -> np.ndarray:
         T = se3.perturb(problem.scene.T_cam_world, np.tile(step[:6], (2, 1)))
-        moved = p.State(
+        moved = p.BundleState(
             T[:, :3, :3], T[:, :3, 3], state.X_world + step[8:], state.intrinsics + basis @ step[6:8]
         )
         return p.residuals(problem.model, moved, links).r[o]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets import catalogue
-from vslam_ref.estimation.calibration import Board, Start, View
+from vslam_ref.estimation.calibration import Board, BoardView, Start
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Radtan
 
@@ -19,7 +19,7 @@ SIZE = (640, 480)
 class Recorded(NamedTuple):
     """Corners that OpenCV found, and the camera that OpenCV's calibration made of them."""
 
-    views: list[View]
+    views: list[BoardView]
     camera: Radtan
     rms_px: float
     T_cam_board: np.ndarray
@@ -34,7 +34,7 @@ def _read(side: str) -> Recorded:
     K, board = data[f"{side}_K"], Board(9, 6)
     camera = Radtan(K[0, 0], K[1, 1], K[0, 2], K[1, 2], *data[f"{side}_dist"])
     T = se3.from_rt(so3.exp(data[f"{side}_rvecs"]), data[f"{side}_tvecs"])
-    return Recorded([View(board.points, data[n]) for n in names], camera, float(data[f"{side}_rms"]), T)
+    return Recorded([BoardView(board.points, data[n]) for n in names], camera, float(data[f"{side}_rms"]), T)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.estimation import least_squares
-from vslam_ref.estimation.calibration import Board, Free, State, calibrate, stack
+from vslam_ref.estimation.calibration import Board, CalibrationState, Free, calibrate, stack
 from vslam_ref.estimation.calibration.arrow import Arrow, ArrowVector, arrow, damped_step, promised, reduce
 from vslam_ref.estimation.calibration.problem import residual, residual_with_jacobians
 from vslam_ref.geometry import se3
@@ -80,8 +80,8 @@ def test_the_dense_solver_finds_the_same_camera_and_covariance() -> None:
     corners = stack(views)
     free = Free(Radtan)
 
-    def unpack(x: np.ndarray) -> State:
-        return State(x[:9], x[9:].reshape(-1, 4, 4))
+    def unpack(x: np.ndarray) -> CalibrationState:
+        return CalibrationState(x[:9], x[9:].reshape(-1, 4, 4))
 
     def plus(x: np.ndarray, step: np.ndarray) -> np.ndarray:
         s = unpack(x)

@@ -15,7 +15,7 @@ from vslam_ref.estimation.calibration import (
     stack,
 )
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import Problem, State
+from vslam_ref.estimation.calibration.problem import CalibrationProblem, CalibrationState
 from vslam_ref.estimation.robust import L2
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import MODELS, Camera, Fisheye, Fov, Pinhole, Radtan, Rational
@@ -91,8 +91,8 @@ def test_covariance_is_honest() -> None:
     low, high = chi2.ppf([5e-5, 1 - 5e-5], 9 * runs)
     assert low < total < high
     # the mistake, poses taken as known, is far outside: the true deviations are several times larger
-    problem = Problem(stack(boards.views(BOARD, camera, T)), Free(Radtan), L2())
-    point = problem.linearise(State(camera.params, T))
+    problem = CalibrationProblem(stack(boards.views(BOARD, camera, T)), Free(Radtan), L2())
+    point = problem.linearise(CalibrationState(camera.params, T))
     assert point is not None
     naive = 0.3 * np.sqrt(np.diag(np.linalg.inv(point.normal.C)))
     assert found.std["cx"] > 3 * naive[2]
@@ -158,9 +158,9 @@ def test_ptams_step_leaves_nine_tenths() -> None:
     T, rng = scene(camera, views=6)
     views = boards.views(BOARD, camera, T, 0.2, rng)
     best = calibrate(views, SIZE, "fov")
-    problem = Problem(stack(views), Free(Fov), L2())
+    problem = CalibrationProblem(stack(views), Free(Fov), L2())
     near = se3.perturb(best.T_cam_board, 1e-3 * np.ones(6))
-    state = State(best.camera.params + [2.0, 2.0, 1.0, -1.0, 0.01], near)
+    state = CalibrationState(best.camera.params + [2.0, 2.0, 1.0, -1.0, 0.01], near)
     point = problem.linearise(state)
     assert point is not None
     least = 0.5 * float((best.residual**2).sum())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 from pathlib import Path
@@ -28,15 +29,20 @@ TRUTH = Radtan(250, 252, 161, 118, -0.2, 0.05, 1e-3, -5e-4)
 BOARD = Board(6, 4, 0.05)
 
 
-def board_image(T_cam_board: np.ndarray) -> np.ndarray:
-    """The board seen by ``TRUTH``: each pixel the mean of 4 rays to the plane."""
+@functools.cache
+def rays() -> np.ndarray:
+    """Bearings (480, 640, 3) of four places in every pixel."""
     sub = np.array([-0.25, 0.25])
     v, u = np.meshgrid(
         (np.arange(240)[:, None] + sub).ravel(), (np.arange(320)[:, None] + sub).ravel(), indexing="ij"
     )
-    ray = TRUTH.unproject(np.stack([u, v], -1)).bearing
+    return TRUTH.unproject(np.stack([u, v], -1)).bearing
+
+
+def board_image(T_cam_board: np.ndarray) -> np.ndarray:
+    """The board seen by ``TRUTH``: each pixel the mean of 4 rays to the plane."""
     T = np.linalg.inv(T_cam_board)
-    d, o = ray @ T[:3, :3].T, T[:3, 3]
+    d, o = rays() @ T[:3, :3].T, T[:3, 3]
     X = o + d * (-o[2] / d[..., 2])[..., None]
     square = np.floor(X[..., :2] / BOARD.square).astype(int)
     on = ((square >= -1) & (square < [6, 4])).all(-1)

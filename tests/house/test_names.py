@@ -1,13 +1,18 @@
-"""Names: what a package gives out is one thing, a module or what stands in it."""
+"""Names: a module and a function do not share one, nor do two ideas."""
 
 from __future__ import annotations
 
+import ast
 import importlib
 import pkgutil
+from collections import defaultdict
 from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 
 import vslam_ref
+
+PACKAGE = Path(vslam_ref.__file__).parent
 
 STILL_TWICE = {
     "vslam_ref.estimation.bundle.covariance",
@@ -18,6 +23,16 @@ STILL_TWICE = {
     "vslam_ref.metrics.consistency.nees",
 }
 """Modules of one function, which their package gives out under the same name.  May only shrink."""
+
+NAMED_TWICE = {
+    "Arrow": "the blocks of calibration's normal equations, in the book and in the fast module",
+    "Belief": "mean and covariance of a filter, in the books of the EKF and of the improved EKF",
+    "Options": "thresholds of a solver, written with the solver's module: least squares, bundle adjustment",
+    "Run": "what one run of an experiment gave; no module sees two of them",
+    "State": "a filter's means and blocks; how a patch's refinement ended",
+    "Step": "of a descent, in the book of features and in least squares",
+}
+"""Class names that stand in two modules or more -> why they may.  Another one needs a better name."""
 
 
 def packages() -> Iterator[ModuleType]:
@@ -36,3 +51,14 @@ def test_no_package_hides_a_module_behind_a_function() -> None:
         if not isinstance(getattr(package, module.name, package), ModuleType)
     }
     assert hidden == STILL_TWICE
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    """A reader who meets a name on a page finds one class of that name; the exceptions have a reason."""
+    places = defaultdict(set)
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].add(str(path.relative_to(PACKAGE)))
+    twice = {name: sorted(files) for name, files in places.items() if len(files) > 1}
+    assert set(twice) == set(NAMED_TWICE), {name: twice.get(name) for name in set(twice) ^ set(NAMED_TWICE)}

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import Claim, Verdict, verdict
-from vslam_ref.experiments.iekf.grid import SensitivityConfig, Setting, settings_of
+from vslam_ref.experiments.iekf.grid import SensitivityConfig, StudySetting, settings_of
 from vslam_ref.experiments.iekf.sentences import SENTENCES
 from vslam_ref.experiments.iekf.settings import Grid, Judged
 
-Share = Callable[[str, Setting], float | None]
-End = Callable[[str, Setting], float]
+Share = Callable[[str, StudySetting], float | None]
+End = Callable[[str, StudySetting], float]
 
 
 def claim(id: str, share: float | None) -> Claim:

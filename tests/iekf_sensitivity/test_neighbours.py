@@ -110,7 +110,7 @@ def test_quick_run_end_to_end(id):
 
 def test_sensitivity_quick_run_end_to_end():
     experiment = load("iekf-sensitivity")
-    study = experiment.run(experiment.configure(quick=True))
+    study = experiment.run(experiment.configure(quick=True, overrides=["study.field.lap_seconds=20"]))
     claims, series = experiment.claims(study), experiment.series(study)
     assert len(claims) == 6 + 28
     assert {c.verdict for c in claims} == {"not testable"}

@@ -15,9 +15,8 @@ from vslam_ref.support.config import without_reason
 from vslam_ref.support.json_text import to_json
 from vslam_ref.worlds.vehicle_field import VehicleFieldConfig
 
-SMALL = StudyConfig(
-    runs=4, population=8, control_runs=8, batch=2, field=VehicleFieldConfig(laps=1, lap_seconds=20.0)
-)
+SHORT = VehicleFieldConfig(laps=1, lap_seconds=20.0, landmarks=10)
+SMALL = StudyConfig(runs=4, population=8, control_runs=8, batch=2, field=SHORT)
 
 
 def bytes_of(config: StudyConfig, context: RunContext) -> str:

@@ -131,7 +131,8 @@ def localised(seed: int) -> tuple[list[int], list[int], float]:
     """Associations of the loop and of the book, and how far their states and covariances are apart."""
     slam, x, P, marks = state(seed)
     corners, of_the_book = shown(x, np.random.default_rng(100 + seed))
-    x, P, which = book.localise(x, P, of_the_book, marks)
+    which = book.associate(x, P, of_the_book, marks)
+    x, P = book.localise(x, P, of_the_book, which)
     found = slam._use(corners).tolist()
     x_found, P_found = (a[0] for a in slam.filter.blocks.full())
     return found, which, float(max(np.abs(x_found - x).max(), np.abs(P_found - P).max()))

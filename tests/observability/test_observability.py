@@ -9,7 +9,7 @@ import pytest
 
 from vslam_ref.filters import observability, observation, vehicle
 from vslam_ref.filters.ekf_slam import EkfSlam
-from vslam_ref.filters.observability import LinearisedRun, Step
+from vslam_ref.filters.observability import LinearisedRun, RunStep
 from vslam_ref.testing import check_jacobian
 
 COV_U = np.diag([1e-3, 1e-3])
@@ -29,7 +29,7 @@ def drive(noise: float, landmarks: int = 4, steps: int = 30, late: bool = True) 
         ids = np.arange(landmarks - (late and k < steps // 2)) if k % 3 == 0 else np.array([], dtype=int)
         z = observation.vehicle_from_world(poses[-1], places[ids])
         z = z + noise * rng.multivariate_normal([0, 0], COV_Z, len(ids))
-        out.append(Step(vehicle.Increment(measured[:1], measured[1:], COV_U[None]), ids, z[None], COV_Z))
+        out.append(RunStep(vehicle.Increment(measured[:1], measured[1:], COV_U[None]), ids, z[None], COV_Z))
     return np.array(poses), places, out
 
 

@@ -45,7 +45,7 @@ GOALS_FE_2 = {"numpy": 5.0, "numba": 2.0}
 Thing = Callable[[], object]
 
 
-class Scene(NamedTuple):
+class ImagePair(NamedTuple):
     """Two images, corners of both, and templates of the first at ``xy`` (N, 2)."""
 
     first: Bytes
@@ -83,17 +83,17 @@ def images() -> dict[str, tuple[Bytes, Bytes]]:
     return found
 
 
-def scene(first: Bytes, second: Bytes) -> Scene:
+def scene(first: Bytes, second: Bytes) -> ImagePair:
     """Choose 1000 corners of the first image that have room around them."""
     xy = detect(first, THRESHOLD).xy
     xy = xy[((xy >= 20) & (xy < np.array(first.shape[::-1]) - 20)).all(1)]
     chosen = np.random.default_rng(1).permutation(len(xy))[:POINTS]
     at = xy[chosen].astype(np.float64)
     templates = warp(first, at, np.broadcast_to(np.eye(2), (len(at), 2, 2)))
-    return Scene(first, second, detect(second, THRESHOLD), templates, at)
+    return ImagePair(first, second, detect(second, THRESHOLD), templates, at)
 
 
-def measure(name: str, given: Scene, backend: str, quick: bool) -> list[Row]:
+def measure(name: str, given: ImagePair, backend: str, quick: bool) -> list[Row]:
     """All rows of one pair of images."""
     repeats = 3 if quick else 15
     counts = f"{len(given.corners.xy)} corners, {len(given.xy)} points"
@@ -153,7 +153,7 @@ def opencv_fast(image: Bytes) -> Thing:
     return lambda: detector.detect(image)
 
 
-def parts(given: Scene) -> dict[str, Thing]:
+def parts(given: ImagePair) -> dict[str, Thing]:
     """What features do for a tracker, one by one and together."""
     first, second, corners, templates, xy = given
     M = np.broadcast_to(np.eye(2) + 0.05, (len(xy), 2, 2))
@@ -177,13 +177,13 @@ def parts(given: Scene) -> dict[str, Thing]:
     }
 
 
-def near(given: Scene) -> Array:
+def near(given: ImagePair) -> Array:
     """Where the search found the points; where it did not, where they were."""
     found = search(given.second, given.corners, given.templates.patch, given.xy, RADIUS)
     return np.where((found.corner >= 0)[:, None], given.corners.xy[found.corner], given.xy)
 
 
-def peers(given: Scene) -> dict[str, dict[str, Thing]]:
+def peers(given: ImagePair) -> dict[str, dict[str, Thing]]:
     """OpenCV's way to the same ends, and ours."""
     import cv2
 

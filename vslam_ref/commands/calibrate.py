@@ -39,7 +39,7 @@ LOSSES = ("l2", "huber", "tukey")
 MODELS = ("radtan", "fov", "fisheye", "pinhole", "rational")
 
 
-class Found(NamedTuple):
+class BoardImages(NamedTuple):
     """Images with a board, their corners, those without, and the size they all have."""
 
     used: list[Path]
@@ -116,7 +116,7 @@ def _fixed(words: list[str]) -> dict[str, float]:
     return fixed
 
 
-def _find(paths: list[Path], board: Board) -> Found:
+def _find(paths: list[Path], board: Board) -> BoardImages:
     """Look for the board in all images."""
     from tqdm import tqdm
 
@@ -144,7 +144,7 @@ def _find(paths: list[Path], board: Board) -> Found:
     if not used or size is None:
         what = f"no board of {board.columns}x{board.rows} inner corners in {len(paths)} image(s)"
         raise ValueError(f"{what}, {_some(paths)}; --board counts inner corners, not squares")
-    return Found(used, corners, skipped, size)
+    return BoardImages(used, corners, skipped, size)
 
 
 def _some(paths: list[Path]) -> str:
@@ -162,7 +162,7 @@ def _refuse(result: Calibration) -> None:
         raise ValueError(f"the images do not determine {result.undetermined}")
 
 
-def _numbers(model: str, found: Found, result: Calibration, seconds: float) -> dict[str, Any]:
+def _numbers(model: str, found: BoardImages, result: Calibration, seconds: float) -> dict[str, Any]:
     camera = result.camera
     return {
         "model": model,
@@ -186,7 +186,7 @@ def _numbers(model: str, found: Found, result: Calibration, seconds: float) -> d
     }
 
 
-def _show(numbers: dict[str, Any], found: Found, result: Calibration) -> None:
+def _show(numbers: dict[str, Any], found: BoardImages, result: Calibration) -> None:
     from vslam_ref.commands.tables import table
 
     rows = [[str(one["file"]), f"{one['rms_px']:.4f}"] for one in numbers["per_image"]]

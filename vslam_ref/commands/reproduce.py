@@ -15,7 +15,7 @@ from vslam_ref.commands.options import add_json, at_least, json_target, write_js
 if TYPE_CHECKING:
     from vslam_ref.experiments.framework.claims import Claim
     from vslam_ref.experiments.framework.experiment import Experiment
-    from vslam_ref.experiments.framework.reproduce import Outcome
+    from vslam_ref.experiments.framework.reproduce import Reproduced
     from vslam_ref.experiments.framework.scheduler import RunContext
 
 HELP = "draw a paper's figure again, with a verdict on every claim"
@@ -129,7 +129,7 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _print_outcome(outcome: Outcome) -> None:
+def _print_outcome(outcome: Reproduced) -> None:
     from vslam_ref.experiments.framework.claims import WORST_FIRST
 
     for claim in sorted(outcome.claims, key=lambda c: WORST_FIRST.index(c.verdict)):
@@ -159,7 +159,7 @@ def _print_summary(verdicts: Sequence[str], out: Path) -> None:
     print(f"{len(verdicts)} claims: {counts}; open {out / 'index.html'}", flush=True)
 
 
-def _numbers(outcomes: Sequence[Outcome], out: Path) -> dict[str, Any]:
+def _numbers(outcomes: Sequence[Reproduced], out: Path) -> dict[str, Any]:
     """Return what was printed, as ``--json`` writes it."""
     return {
         "out": str(out),

@@ -25,7 +25,7 @@ NAMES = ("EXPERIMENT", "EXPERIMENTS")
 _registered: dict[str, Experiment[Any]] = {}
 
 
-class Summary(NamedTuple):
+class ExperimentSummary(NamedTuple):
     """What a listing shows of an experiment."""
 
     id: str
@@ -51,9 +51,9 @@ def unregister(id: str) -> None:
     del _registered[id]
 
 
-def summaries() -> list[Summary]:
+def summaries() -> list[ExperimentSummary]:
     """Return all experiments, sorted by id, without importing them."""
-    added = [Summary(e.id, e.title, e.source) for e in _registered.values()]
+    added = [ExperimentSummary(e.id, e.title, e.source) for e in _registered.values()]
     return sorted([*(summary for summary, _ in _modules().values()), *added])
 
 
@@ -82,9 +82,9 @@ def load(id: str) -> Experiment[Any]:
 
 
 @cache
-def _modules() -> dict[str, tuple[Summary, str]]:
+def _modules() -> dict[str, tuple[ExperimentSummary, str]]:
     """Find the experiments of the package, and the modules they stand in, by reading the sources."""
-    found: dict[str, tuple[Summary, str]] = {}
+    found: dict[str, tuple[ExperimentSummary, str]] = {}
     for path in sorted(Path(__file__).parent.glob("*/*.py")):
         for summary in read(path):
             if summary.id in found:
@@ -93,7 +93,7 @@ def _modules() -> dict[str, tuple[Summary, str]]:
     return found
 
 
-def read(path: Path) -> list[Summary]:
+def read(path: Path) -> list[ExperimentSummary]:
     """Read id, title and source of a module's experiments from the literal arguments of their calls.
 
     Raises
@@ -124,11 +124,11 @@ def _calls(value: ast.expr) -> list[ast.Call]:
     return [row for row in rows if isinstance(row, ast.Call)]
 
 
-def _summary(path: Path, call: ast.Call) -> Summary:
+def _summary(path: Path, call: ast.Call) -> ExperimentSummary:
     given = {k.arg: k.value.value for k in call.keywords if isinstance(k.value, ast.Constant)}
-    missing = [name for name in Summary._fields if not isinstance(given.get(name), str)]
+    missing = [name for name in ExperimentSummary._fields if not isinstance(given.get(name), str)]
     if missing:
         raise ValueError(f"{path}: EXPERIMENT must give {', '.join(missing)} as literal keyword strings")
     if not str(given["id"]).startswith(f"{path.parent.name}-"):
         raise ValueError(f"{path}: EXPERIMENT has id {given['id']!r}, which belongs in another folder")
-    return Summary(*(str(given[name]) for name in Summary._fields))
+    return ExperimentSummary(*(str(given[name]) for name in ExperimentSummary._fields))

@@ -46,7 +46,7 @@ from vslam_ref.filters.carleman_ekf import lift, moments
 from vslam_ref.filters.ekf_slam import EkfSlam
 
 
-class Step(NamedTuple):
+class RunStep(NamedTuple):
     """One step of one run: an increment (batch of 1), then a sighting (m may be 0).
 
     ``ids`` (m,) in 0 ... n - 1, ``z`` (1, m, 2) and ``cov_z`` (m, 2, 2) as in :meth:`EkfSlam.update`.
@@ -190,7 +190,7 @@ def linearise_truth(
     return LinearisedRun(tuple(F), tuple(H))
 
 
-def linearise_ekf(slam: EkfSlam, steps: Iterable[Step], landmarks: int) -> LinearisedRun:
+def linearise_ekf(slam: EkfSlam, steps: Iterable[RunStep], landmarks: int) -> LinearisedRun:
     """Drive an EKF (batch of 1) through ``steps`` and write down where it linearises.
 
     F at the updated pose, H at the predicted pose and the current map.  A landmark's first sighting
@@ -217,7 +217,7 @@ def linearise_ekf(slam: EkfSlam, steps: Iterable[Step], landmarks: int) -> Linea
     return LinearisedRun(tuple(F), tuple(H))
 
 
-def linearise_lifted(steps: Iterable[Step], landmarks: int, control: str = "first_order") -> LinearisedRun:
+def linearise_lifted(steps: Iterable[RunStep], landmarks: int, control: str = "first_order") -> LinearisedRun:
     """M(U_k) and the constant H of the lifted filter, 11 + 6 n states: no estimate enters."""
     F, H = [], []
     for step in steps:

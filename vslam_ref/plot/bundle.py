@@ -11,17 +11,17 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from vslam_ref.arrays import Array
 from vslam_ref.plot import style
 
-LOSS_LOOKS: dict[str, style.Look] = {
-    "l2": style.Look("least squares", style.GREY, ":"),
-    "huber": style.Look("Huber, σ known", style.GREEN, "-."),
-    "tukey": style.Look("Tukey, σ known", style.BLUE, "--"),
-    "adaptive": style.Look("Tukey, σ found", style.VERMILION, "-"),
-    "ptam": style.Look("Tukey, PTAM's constants", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
+LOSS_LOOKS: dict[str, style.LineStyle] = {
+    "l2": style.LineStyle("least squares", style.GREY, ":"),
+    "huber": style.LineStyle("Huber, σ known", style.GREEN, "-."),
+    "tukey": style.LineStyle("Tukey, σ known", style.BLUE, "--"),
+    "adaptive": style.LineStyle("Tukey, σ found", style.VERMILION, "-"),
+    "ptam": style.LineStyle("Tukey, PTAM's constants", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
 }
 
 
 def _curve(
-    axes: Axes, x: Array, line: Array, look: style.Look, band: tuple[Array | None, Array | None]
+    axes: Axes, x: Array, line: Array, look: style.LineStyle, band: tuple[Array | None, Array | None]
 ) -> None:
     axes.plot(x, line, color=look.colour, ls=look.line, marker="o", ms=3.5, lw=2, label=look.name)
     if band[0] is not None and band[1] is not None:

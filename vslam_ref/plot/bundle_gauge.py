@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from vslam_ref.estimation.bundle import Scene
 
 
-GAUGE_LOOKS: dict[str, tuple[style.Look, str]] = {
-    "free": (style.Look("free: nothing held", style.BLUE, "-"), "o"),
-    "fixed": (style.Look("fixed: view 0, far coordinate", style.VERMILION, "--"), "s"),
-    "badly": (style.Look("badly: view 0, near coordinate", style.PURPLE, ":"), "^"),
+GAUGE_LOOKS: dict[str, tuple[style.LineStyle, str]] = {
+    "free": (style.LineStyle("free: nothing held", style.BLUE, "-"), "o"),
+    "fixed": (style.LineStyle("fixed: view 0, far coordinate", style.VERMILION, "--"), "s"),
+    "badly": (style.LineStyle("badly: view 0, near coordinate", style.PURPLE, ":"), "^"),
 }
 RADIUS_95 = float(np.sqrt(-2.0 * np.log(0.05)))
 """Of the ellipse that holds 95 % of a plane Gaussian, in standard deviations: 2.4477."""

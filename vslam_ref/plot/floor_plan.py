@@ -19,13 +19,13 @@ from vslam_ref.plot import style
 from vslam_ref.worlds.floor_plan import Recording
 
 STATIC, MOVING, ROBOT, MARK = style.BLACK, style.VERMILION, style.BLUE, style.GREEN
-MODES: dict[str, style.Look] = {
-    "separated": style.Look("S and D", style.BLUE, "-"),
-    "plain": style.Look("plain grid", style.VERMILION, "--"),
-    "ideal": style.Look("moving beams left out by the truth", style.BLACK, ":"),
-    "forbidden": style.Look("taken from S, withdrawn when wrong", style.BLUE, "-"),
-    "allowed": style.Look("any corner", style.VERMILION, "--"),
-    "odometry": style.Look("odometry alone", style.GREY, ":"),
+MODES: dict[str, style.LineStyle] = {
+    "separated": style.LineStyle("S and D", style.BLUE, "-"),
+    "plain": style.LineStyle("plain grid", style.VERMILION, "--"),
+    "ideal": style.LineStyle("moving beams left out by the truth", style.BLACK, ":"),
+    "forbidden": style.LineStyle("taken from S, withdrawn when wrong", style.BLUE, "-"),
+    "allowed": style.LineStyle("any corner", style.VERMILION, "--"),
+    "odometry": style.LineStyle("odometry alone", style.GREY, ":"),
 }
 
 

@@ -13,14 +13,14 @@ from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust import Loss
 from vslam_ref.plot import style
 
-LOOKS: dict[str, style.Look] = {
-    "printed": style.Look("A2.8 as printed", style.VERMILION, "-"),
-    "corrected": style.Look("Tukey, corrected", style.BLUE, "--"),
-    "huber": style.Look("Huber", style.GREEN, "-."),
-    "l2": style.Look("least squares", style.GREY, ":"),
-    "cauchy": style.Look("Cauchy", style.ORANGE, (0, (5, 1, 1, 1))),  # type: ignore[arg-type]
-    "geman-mcclure": style.Look("Geman-McClure", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
-    "tukey": style.Look("Tukey", style.BLUE, "--"),
+LOOKS: dict[str, style.LineStyle] = {
+    "printed": style.LineStyle("A2.8 as printed", style.VERMILION, "-"),
+    "corrected": style.LineStyle("Tukey, corrected", style.BLUE, "--"),
+    "huber": style.LineStyle("Huber", style.GREEN, "-."),
+    "l2": style.LineStyle("least squares", style.GREY, ":"),
+    "cauchy": style.LineStyle("Cauchy", style.ORANGE, (0, (5, 1, 1, 1))),  # type: ignore[arg-type]
+    "geman-mcclure": style.LineStyle("Geman-McClure", style.PURPLE, (0, (3, 1, 1, 1, 1, 1))),  # type: ignore[arg-type]
+    "tukey": style.LineStyle("Tukey", style.BLUE, "--"),
 }
 
 

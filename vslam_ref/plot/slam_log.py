@@ -15,7 +15,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.plot import style
 
 COMPONENTS = (("x error", "m"), ("y error", "m"), ("heading error", "rad"))
-BATCH = style.Look("batch least squares", style.BLACK, ":")
+BATCH = style.LineStyle("batch least squares", style.BLACK, ":")
 TRUTH = style.GREY
 
 
@@ -44,7 +44,7 @@ class Drawn(NamedTuple):
     sigmas: Array
 
 
-def _look(name: str) -> style.Look:
+def _look(name: str) -> style.LineStyle:
     return BATCH if name == "batch" else style.look(name)
 
 

@@ -30,7 +30,7 @@ WIDTH = 10.0
 """Inches; 1200 pixels at :data:`DPI`."""
 
 
-class Look(NamedTuple):
+class LineStyle(NamedTuple):
     """How a filter is drawn: its name in a legend, colour and line style."""
 
     name: str
@@ -38,12 +38,12 @@ class Look(NamedTuple):
     line: str
 
 
-FILTERS: dict[str, Look] = {
-    "ekf": Look("EKF", VERMILION, "-"),
-    "iekf": Look("IEKF (Carleman lift)", BLUE, "-"),
-    "ekf-anchored": Look("anchored EKF", GREEN, "--"),
-    "ekf-ideal": Look("ideal EKF (Jacobians at truth)", PURPLE, "-."),
-    "control": Look("consistent control", GREY, ":"),
+FILTERS: dict[str, LineStyle] = {
+    "ekf": LineStyle("EKF", VERMILION, "-"),
+    "iekf": LineStyle("IEKF (Carleman lift)", BLUE, "-"),
+    "ekf-anchored": LineStyle("anchored EKF", GREEN, "--"),
+    "ekf-ideal": LineStyle("ideal EKF (Jacobians at truth)", PURPLE, "-."),
+    "control": LineStyle("consistent control", GREY, ":"),
 }
 
 P0_TITLES: dict[str, str] = {
@@ -67,9 +67,9 @@ _RC: dict[Any, Any] = {
 }
 
 
-def look(name: str) -> Look:
+def look(name: str) -> LineStyle:
     """Return how a filter is drawn; an unknown one in black under its own name."""
-    return FILTERS.get(name, Look(name, BLACK, "-"))
+    return FILTERS.get(name, LineStyle(name, BLACK, "-"))
 
 
 @contextmanager

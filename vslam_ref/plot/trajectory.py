@@ -11,8 +11,8 @@ from vslam_ref.arrays import Array
 from vslam_ref.plot import style
 
 AXES = "xyz"
-TRUTH = style.Look("truth", style.BLACK, "--")
-ESTIMATE = style.Look("estimate", style.BLUE, "-")
+TRUTH = style.LineStyle("truth", style.BLACK, "--")
+ESTIMATE = style.LineStyle("estimate", style.BLUE, "-")
 ERROR = style.VERMILION
 GAP = 20.0
 """A step this many times longer than the median is a gap."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.calibration.board import Board, View
+from vslam_ref.estimation.calibration.board import Board, BoardView
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera
 
@@ -73,7 +73,7 @@ def views(
     T_cam_board: Array,
     sigma_px: float = 0.0,
     rng: np.random.Generator | None = None,
-) -> list[View]:
+) -> list[BoardView]:
     """Corners of the board at some poses, with Gaussian noise.
 
     Parameters
@@ -88,7 +88,7 @@ def views(
 
     Returns
     -------
-    list of View
+    list of BoardView
 
     Raises
     ------
@@ -101,4 +101,4 @@ def views(
     if not seen.valid.all():
         raise ValueError("a corner is behind the camera or outside its field")
     noise = sigma_px * rng.standard_normal(seen.uv.shape) if rng is not None else 0.0
-    return [View(board.points, uv) for uv in seen.uv + noise]
+    return [BoardView(board.points, uv) for uv in seen.uv + noise]

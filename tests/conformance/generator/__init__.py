@@ -14,6 +14,7 @@ from types import ModuleType
 HELPERS = (
     "exact",
     "building",
+    "draws",
     "writing",
     "exact_arrays",
     "exact_ekf",

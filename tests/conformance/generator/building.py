@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,14 @@ import numpy as np
 from vslam_ref.conformance.vectors_format import CONVENTION
 
 VERSION = "0.1.0"
+CHANGED = dict.fromkeys(
+    (
+        *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss", "least_squares"),
+        *("bundle", "format", "trajectory"),
+    ),
+    "0.1.1",  # random inputs of 12 digits
+)
+"""Topic -> its version, where its numbers have changed since VERSION."""
 FORMAT = 1
 
 
@@ -48,17 +57,14 @@ class Topic:
     ----------
     chapter : int
     topic : str
+    notes : mapping
+        Mistake -> what a program does that gives its value, and the wrong formula.
     """
 
     chapter: int
     topic: str
-    notes: dict[str, dict[str, str]] = field(default_factory=dict)
+    notes: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     groups: list[dict[str, Any]] = field(default_factory=list)
-
-    def note(self, identity: str, meaning: str, formula: str) -> str:
-        """Explain a mistake: what a program does that gives this value, and the wrong formula."""
-        self.notes[identity] = {"meaning": meaning, "formula": formula}
-        return identity
 
     def group(
         self,
@@ -68,7 +74,7 @@ class Topic:
         tolerance: dict[str, Any],
         cases: list[dict[str, Any]],
         *,
-        flags: tuple[str, ...] = (),
+        flags: str | tuple[str, ...] = (),
         statistic: dict[str, Any] | None = None,
     ) -> None:
         """Add cases of one regime.
@@ -81,11 +87,12 @@ class Topic:
             Of :func:`tolerance`.
         cases : list of dict
             ``inputs`` and ``expected``; where needed ``accept``, ``mistakes``, ``result``.
-        flags : tuple of str
-            The regime, as ``near_pi``.
+        flags : str or tuple of str
+            The regime, as ``near_pi``; empty for the generic one.
         statistic : dict, optional
             How random answers are judged.
         """
+        flags = tuple(flag for flag in ([flags] if isinstance(flags, str) else flags) if flag)
         regime = "-".join(flags) or "generic"
         stem = f"{function}/{regime}"
         taken = sum(len(g["cases"]) for g in self.groups if g["stem"] == stem)
@@ -108,12 +115,12 @@ class Topic:
         used = sorted({group["equation"] for group in self.groups})
         head = {
             "format": FORMAT,
-            "version": VERSION,
+            "version": CHANGED.get(self.topic, VERSION),
             "chapter": self.chapter,
             "topic": self.topic,
             "equations": used,
             "convention": CONVENTION,
-            "notes": self.notes,
+            "notes": {key: {"meaning": m, "formula": f} for key, (m, f) in self.notes.items()},
         }
         lines = [json.dumps(head, indent=1)[:-2] + ","]
         lines.append(' "groups": [')

@@ -55,9 +55,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     reason = "a pixel of some hundreds, rounded a few times, less another: the residual keeps what is left"
     rule = tolerance(0.0, reason, absolute=2e-12)
     rule["float32"]["absolute"] = 2e-3

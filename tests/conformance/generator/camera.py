@@ -83,9 +83,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All models."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for model in LENSES:
         _project(topic, rng, model)
         _unproject(topic, rng, model)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from generator import exact_lift
 from generator.building import Topic, tolerance
-from generator.ekf import case, some, trace_case
-from generator.exact_arrays import big
+from generator.ekf import asked, some, trace_case
 from generator.world import covariance, drive, increment, lifted_state
 
 TOPIC, CHAPTER = "carleman", 16
@@ -62,9 +59,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of the lifted filter."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _predictions(topic, rng)
     _updates(topic, rng)
     _new_landmarks(topic, rng)
@@ -87,13 +82,8 @@ def _predictions(topic: Topic, rng: np.random.Generator) -> None:
         for k in range(count):
             Z, P = lifted_state(rng, n, off=flags != ())
             moved, cov = increment(rng)
-            args = [big(v) for v in (Z, P, moved, cov)]
-
-            def answer(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.predict(*args, wrong=wrong)
-
             inputs = {"Z": Z, "P": P, "increment": moved, "cov": cov}
-            cases.append(case(inputs, answer, some(names, k, 1) if names else [], ("Z", "P")))
+            cases.append(asked(inputs, exact_lift.predict, some(names, k, 1) if names else [], ("Z", "P")))
         label = "eq-cross-blocks" if "map" in flags else "eq-b17"
         topic.group("carleman.predict", label, ALGEBRA, rule, cases, flags=flags)
 
@@ -108,14 +98,11 @@ def _updates(topic: Topic, rng: np.random.Generator) -> None:
             at = [[*range(11), *range(11 + 6 * i, 17 + 6 * i)] for i in ids]
             z = np.round([H @ Z[columns] + 0.2 * rng.standard_normal(2) for columns in at], 3)
             inputs = {"Z": Z, "P": P, "ids": ids, "z": z, "cov_z": covariance(rng, np.array([0.1, 0.15]))}
-            args = [big(Z), big(P), ids, big(z), big(inputs["cov_z"])]
-
-            def answer(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.update(*args, wrong=wrong)
-
             names = ["innovation-sign", "global-measurement", "heading-renormalised"]
-            cases.append(case(inputs, answer, some(names, k, 1) if not flag and k < 3 else [], ("Z", "P")))
-        topic.group("carleman.update", "eq-b22", ALGEBRA, rule, cases, flags=(flag,) if flag else ())
+            cases.append(
+                asked(inputs, exact_lift.update, some(names, k, 1) if not flag and k < 3 else [], ("Z", "P"))
+            )
+        topic.group("carleman.update", "eq-b22", ALGEBRA, rule, cases, flags=flag)
 
 
 def _new_landmarks(topic: Topic, rng: np.random.Generator) -> None:
@@ -125,15 +112,12 @@ def _new_landmarks(topic: Topic, rng: np.random.Generator) -> None:
         for k in range(count):
             Z, P = lifted_state(rng, n, off=True)
             z, cov_z = np.round(rng.uniform(-8, 8, 2), 3), covariance(rng, np.array([0.1, 0.3]))
-            args = [big(v) for v in (Z, P, z, cov_z)]
-
-            def answer(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.augment(*args, wrong=wrong)
-
             names = ["b26-as-printed", "identity-landmark", "no-cross-covariance"]
             names = some(names, k, 1) if not flag else []
-            cases.append(case({"Z": Z, "P": P, "z": z, "cov_z": cov_z}, answer, names, ("Z", "P")))
-        topic.group("carleman.augment", "eq-b28", ALGEBRA, rule, cases, flags=(flag,) if flag else ())
+            cases.append(
+                asked({"Z": Z, "P": P, "z": z, "cov_z": cov_z}, exact_lift.augment, names, ("Z", "P"))
+            )
+        topic.group("carleman.augment", "eq-b28", ALGEBRA, rule, cases, flags=flag)
 
 
 def _traces(topic: Topic, rng: np.random.Generator) -> None:

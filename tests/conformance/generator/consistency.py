@@ -10,12 +10,13 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import digits
 from generator.ekf import trace_case
 from generator.exact_arrays import big, doubles, inverse, wrap
 from generator.exact_ekf import anchored_run
 from generator.exact_quantiles import normal_quantile, quantile
 from generator.random_answers import runs
-from generator.world import digits, drive
+from generator.world import drive
 from vslam_ref.arrays import Array
 
 TOPIC, CHAPTER = "consistency", 17
@@ -76,9 +77,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of consistency."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _nees(topic, rng)
     _pose_errors(topic, rng)
     _bands(topic, rng)
@@ -155,7 +154,7 @@ def _pose_errors(topic: Topic, rng: np.random.Generator) -> None:
             "definition, 50 digits",
             rule,
             cases,
-            flags=(flag,) if flag else (),
+            flags=flag,
         )
 
 

@@ -93,9 +93,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of EKF-SLAM."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _predictions(topic, rng)
     _updates(topic, rng)
     _new_landmarks(topic, rng)
@@ -119,7 +117,7 @@ def _predictions(topic: Topic, rng: np.random.Generator) -> None:
     }
     for flag, (count, draw) in regimes.items():
         cases = [_predict(draw(), k) for k in range(count)]
-        topic.group("ekf.predict", "eq-predict", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+        topic.group("ekf.predict", "eq-predict", DEFINITION, rule, cases, flags=flag)
 
 
 def _motion(
@@ -168,6 +166,17 @@ def case(
     return {**out, "mistakes": mistakes} if mistakes else out
 
 
+def asked(
+    inputs: dict[str, Any],
+    function: Callable[..., tuple[Big, Big]],
+    names: list[str],
+    outputs: tuple[str, str] = ("x", "P"),
+) -> dict[str, Any]:
+    """A case whose answers ``function`` makes of the inputs, in their order and in 50 digits; ids stay."""
+    args = [v if isinstance(v, list) else big(v) if np.ndim(v) else mpf(v) for v in inputs.values()]
+    return case(inputs, lambda wrong: function(*args, wrong=wrong), names, outputs)
+
+
 def some(names: list[str], k: int, count: int = 2) -> list[str]:
     """Some of the mistakes, others for every case: each whole answer is long."""
     return [names[(count * k + j) % len(names)] for j in range(min(count, len(names)))]
@@ -194,7 +203,7 @@ def _updates(topic: Topic, rng: np.random.Generator) -> None:
     }
     for flag, (count, draw) in regimes.items():
         cases = [_update(draw(), k) for k in range(count)]
-        topic.group("ekf.update", "eq-gain", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+        topic.group("ekf.update", "eq-gain", DEFINITION, rule, cases, flags=flag)
 
 
 def _sighting(rng: np.random.Generator, n: int, ids: list[int]) -> dict[str, Any]:
@@ -241,7 +250,7 @@ def _new_landmarks(topic: Topic, rng: np.random.Generator) -> None:
             z = np.round(rng.uniform(-8, 8, 2), 3)
             inputs = {"x": x, "P": P, "z": z, "cov_z": covariance(rng, np.array([0.1, 0.3]))}
             cases.append(_augment(inputs, k))
-        topic.group("ekf.augment", "eq-augment", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+        topic.group("ekf.augment", "eq-augment", DEFINITION, rule, cases, flags=flag)
 
 
 def _augment(inputs: dict[str, Any], k: int) -> dict[str, Any]:

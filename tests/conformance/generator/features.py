@@ -12,7 +12,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
-from generator.world import digits
+from generator.draws import digits
 
 TOPIC, CHAPTER = "features", 8
 Image = list[list[int]]
@@ -69,9 +69,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of image features."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _corners(topic, rng)
     _levels(topic, rng)
     _comparisons(topic, rng)

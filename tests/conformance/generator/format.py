@@ -40,9 +40,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Reading both formats, and writing one."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     exact = tolerance(2.3e-16, "a decimal number is read to the nearest double", float32=1e-6)
     for flag in ("plain", "comments", "spaces", "exponents", "unix_time"):
         cases = [_tum(rng, flag) for _ in range(4)]

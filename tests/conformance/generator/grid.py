@@ -10,9 +10,9 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import digits
 from generator.exact_rays import rays
 from generator.two_maps import explained, histories, logit, two_maps
-from generator.world import digits
 from vslam_ref.arrays import Array
 
 TOPIC, CHAPTER = "grid", 19
@@ -91,9 +91,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of grids."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _log_odds(topic, rng)
     _probabilities(topic, rng)
     _recursion(topic, rng)
@@ -184,7 +182,7 @@ def _recursion(topic: Topic, rng: np.random.Generator) -> None:
     }
     for flag, draw in draws.items():
         cases = [_one_update(*np.round(draw(), 7).tolist()) for _ in range(15)]
-        topic.group("grid.update", "eq-a4-2", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+        topic.group("grid.update", "eq-a4-2", DEFINITION, rule, cases, flags=flag)
     cases = []
     for table, transition, prediction in np.round(rng.normal(0, 2, (10, 3)), 3).tolist():
         inputs = {"table": table, "transition": transition, "prediction": prediction}

@@ -15,6 +15,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator import exact
+from generator.draws import rotation_vector
 from generator.exact import Matrix, column, expm, floats, integrated, matrix, vector
 from generator.so3 import log_of, polar
 from vslam_ref.arrays import Array
@@ -101,10 +102,7 @@ SIM3 = Group(7, _hat_similar, _vee_similar)
 
 def turn(rng: np.random.Generator, flag: str = "generic") -> Array:
     """Rotation vector of a regime."""
-    low, high = REGIMES[flag]
-    axis = rng.standard_normal(3)
-    angle = np.exp(rng.uniform(np.log(low), np.log(high)))
-    return np.asarray(angle * axis / np.linalg.norm(axis))
+    return rotation_vector(rng, *REGIMES[flag])
 
 
 def shift(rng: np.random.Generator, size: float = 2.0) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import log_uniform
 from generator.exact import column, floats, matrix, vector
 from vslam_ref.arrays import Array
 
@@ -37,9 +38,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Steps, and runs."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     reason = (
         "condition of J, below 1e2, squared as in the normal equations, times eps and some ten operations"
     )
@@ -67,7 +66,7 @@ def build(rng: np.random.Generator) -> Topic:
         "damped": (0.05, 5.0),
         "large_damping": (1e3, 1e6),
     }.items():
-        cases = [_damped(*s, float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng) for s in some[:10]]
+        cases = [_damped(*s, log_uniform(rng, low, high), rng) for s in some[:10]]
         topic.group("least_squares.lm_step", "eq-damped", NORMAL, fine, cases, flags=(flag,))
     cases = [_damped(*_rank_one(rng), float(rng.uniform(0.1, 2.0)), rng) for _ in range(5)]
     topic.group("least_squares.lm_step", "eq-damped", NORMAL, fine, cases, flags=("degenerate",))

@@ -13,6 +13,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
+from generator.draws import digits, log_uniform
 from generator.exact import Matrix, derivative, vector
 from vslam_ref.arrays import Array
 
@@ -126,8 +127,8 @@ def camera(rng: np.random.Generator, model: str) -> Array:
 def ray(rng: np.random.Generator, low: float, high: float) -> Array:
     """Point at depth 1 to 6 whose ray has a tangent to the axis in a range, log-uniform."""
     turn, depth = rng.uniform(0, 2 * np.pi), rng.uniform(1.0, 6.0)
-    r = np.exp(rng.uniform(np.log(low), np.log(high)))
-    return np.array([r * np.cos(turn) * depth, r * np.sin(turn) * depth, depth])
+    r = log_uniform(rng, low, high)
+    return digits([r * np.cos(turn) * depth, r * np.sin(turn) * depth, depth])
 
 
 def as_params(values: Array) -> Vector:

@@ -8,10 +8,10 @@ import numpy as np
 
 from generator import exact_lift
 from generator.building import Topic, tolerance
-from generator.ekf import case, some
+from generator.draws import digits
+from generator.ekf import asked, some
 from generator.exact_arrays import big, doubles
-from generator.world import covariance, digits, increment, lifted_state, random_pose
-from vslam_ref.arrays import Array
+from generator.world import covariance, increment, lifted_state, random_pose
 
 TOPIC, CHAPTER = "lift", 16
 DEFINITION = "definition in 50 digits, Jacobians by difference quotients"
@@ -40,9 +40,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of lifts."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _lifts(topic, rng)
     _poses(topic, rng)
     _landmarks(topic, rng)
@@ -56,13 +54,9 @@ def _lifts(topic: Topic, rng: np.random.Generator) -> None:
         cases = []
         for k in range(count):
             x, P = random_pose(rng, flag)
-
-            def answer(wrong: str, x: Array = x, P: Array = P) -> Any:
-                return exact_lift.lifted_start(big(x), big(P), wrong=wrong)
-
             names = some(["no-products", "cos-before-sin"], k, 1) if not flag else []
-            cases.append(case({"x": x, "P": P}, answer, names, ("Z", "P_Z")))
-        topic.group("lift.vehicle", "eq-b14", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+            cases.append(asked({"x": x, "P": P}, exact_lift.lifted_start, names, ("Z", "P_Z")))
+        topic.group("lift.vehicle", "eq-b14", DEFINITION, rule, cases, flags=flag)
 
 
 def _poses(topic: Topic, rng: np.random.Generator) -> None:
@@ -73,13 +67,9 @@ def _poses(topic: Topic, rng: np.random.Generator) -> None:
             x, _ = random_pose(rng, flag)
             z = np.round([*x[:2], length * np.sin(x[2]), length * np.cos(x[2])], 6)
             P = covariance(rng, np.array([0.3, 0.25, 0.1, 0.1]))
-
-            def answer(wrong: str, z: Array = z, P: Array = P) -> Any:
-                return exact_lift.pose(big(z), big(P), wrong=wrong)
-
             names = some(["atan2-swapped", "length-forgotten"], k, 1)
-            cases.append(case({"z": z, "P": P}, answer, names))
-        topic.group("lift.pose", "eq-b5", DEFINITION, rule, cases, flags=(flag,) if flag else ())
+            cases.append(asked({"z": z, "P": P}, exact_lift.pose, names))
+        topic.group("lift.pose", "eq-b5", DEFINITION, rule, cases, flags=flag)
 
 
 def _landmarks(topic: Topic, rng: np.random.Generator) -> None:
@@ -112,28 +102,17 @@ def _gaussian(topic: Topic, rng: np.random.Generator) -> None:
         for _ in range(4):
             x, _ = random_pose(rng)
             P = digits(covariance(rng, np.array([0.3, 0.25, 0.4])) * scale**2)
-
-            def answer(wrong: str, x: Array = x, P: Array = P) -> Any:
-                return exact_lift.gaussian_start(big(x), big(P), wrong=wrong)
-
             names = ["first-order"] if not flag else []
-            cases.append(case({"x": x, "P": P}, answer, names, ("Z", "P_Z")))
-        topic.group(
-            "lift.gaussian", "eq-gaussian-moments", oracle, rule, cases, flags=(flag,) if flag else ()
-        )
+            cases.append(asked({"x": x, "P": P}, exact_lift.gaussian_start, names, ("Z", "P_Z")))
+        topic.group("lift.gaussian", "eq-gaussian-moments", oracle, rule, cases, flags=flag)
     for flag, n, count in (("", 0, 4), ("map", 1, 1)):
         cases = []
         for _ in range(count):
             Z, P = lifted_state(rng, n, off=True)
             moved, cov = increment(rng)
-            args = [big(v) for v in (Z, P, moved, 9 * cov)]
-
-            def predicted(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.predict_gaussian(*args, wrong=wrong)
-
             inputs = {"Z": Z, "P": P, "increment": moved, "cov": 9 * cov}
-            cases.append(case(inputs, predicted, ["product-of-means"] if not n else [], ("Z", "P")))
+            cases.append(
+                asked(inputs, exact_lift.predict_gaussian, ["product-of-means"] if not n else [], ("Z", "P"))
+            )
         rule = tolerance(2e-13, "sums of 17 x 17 products at most, each rounded by eps, and their moments")
-        topic.group(
-            "lift.gaussian_predict", "eq-gaussian-moments", oracle, rule, cases, flags=(flag,) if flag else ()
-        )
+        topic.group("lift.gaussian_predict", "eq-gaussian-moments", oracle, rule, cases, flags=flag)

@@ -10,6 +10,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import digits
 from generator.exact import floats, vector
 from vslam_ref.arrays import Array
 
@@ -81,9 +82,7 @@ REGIMES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Five losses, three functions, four regimes, and the seam."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for name in COSTS:
         for flag, (low, high, count) in REGIMES.items():
             if name == "l2" and flag not in ("inside", "tiny"):
@@ -99,7 +98,7 @@ def _residuals(rng: np.random.Generator, low: float, high: float) -> tuple[float
     """A constant, and five residuals in a range of it; two lie on either side of the middle."""
     c = float(rng.uniform(0.8, 6.0))
     u = (np.arange(5) + rng.uniform(0.1, 0.9, 5)) / 5.0
-    return c, c * rng.choice([-1.0, 1.0], 5) * low * (high / low) ** u
+    return c, digits(c * rng.choice([-1.0, 1.0], 5) * low * (high / low) ** u)
 
 
 def _group(topic: Topic, name: str, flags: tuple[str, ...], some: list[tuple[float, Array]]) -> None:

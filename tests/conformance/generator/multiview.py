@@ -89,9 +89,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _triangulate(topic, rng)
     optimal_groups(topic, rng)
     pose_groups(topic, rng)

@@ -49,9 +49,7 @@ UNIFORM = {  # the same for other distributions: note -> measure -> mean, varian
 
 def build(rng: np.random.Generator) -> Topic:
     """Three moments for two standard deviations."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for sigma, size in ((0.5, "half_a_pixel"), (2.0, "two_pixels")):
         for measure in MOMENTS:
             topic.group(

@@ -29,9 +29,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Both ways, in all regimes."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     fine = tolerance(2e-15, "a dozen operations on numbers up to 1, each within eps = 2.2e-16")
     oracle = "half-angle definition and power series of the rotation, 50 digits"
     for flag in REGIMES:

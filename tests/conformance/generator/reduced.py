@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from generator import exact_lift
 from generator.building import Topic, tolerance
-from generator.ekf import case, some, trace_case
-from generator.exact_arrays import big
+from generator.draws import digits
+from generator.ekf import asked, some, trace_case
 from generator.lift import gaussian_tolerance
-from generator.world import covariance, digits, drive, increment, random_pose
-from vslam_ref.arrays import Array
+from generator.world import covariance, drive, increment, random_pose
 
 TOPIC, CHAPTER = "reduced", 16
 DEFINITION = "definition in 50 digits, Jacobians by difference quotients"
@@ -44,9 +41,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of the reduced filter."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _reduced(topic, rng)
     _traces(topic, rng)
     _gaussian(topic, rng)
@@ -63,16 +58,11 @@ def _reduced(topic: Topic, rng: np.random.Generator) -> None:
             m = np.round([*x[:2], np.sin(x[2]), np.cos(x[2]), *rng.uniform(-9, 9, 2 * n)], 4)
             P = covariance(rng, np.array([0.3, 0.25, 0.1, 0.1, *[0.4] * (2 * n)]))
             moved, cov = increment(rng)
-            args = [big(v) for v in (m, P, moved, cov)]
-
-            def answer(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.reduced_predict(*args, wrong=wrong)
-
             inputs = {"m": m, "P": P, "increment": moved, "cov": cov}
             names = some(of_map, k, 1) if n else ["gtpg"]
-            cases.append(case(inputs, answer, names, ("m", "P")))
+            cases.append(asked(inputs, exact_lift.reduced_predict, names, ("m", "P")))
         label = "eq-reduced-filter"
-        topic.group("reduced.predict", label, DEFINITION, rule, cases, flags=(flag,) if flag else ())
+        topic.group("reduced.predict", label, DEFINITION, rule, cases, flags=flag)
 
 
 def _traces(topic: Topic, rng: np.random.Generator) -> None:
@@ -94,25 +84,16 @@ def _gaussian(topic: Topic, rng: np.random.Generator) -> None:
         for k in range(8):
             x, _ = random_pose(rng)
             P = digits(covariance(rng, np.array([0.3, 0.25, 0.4])) * scale**2)
-
-            def started(wrong: str, x: Array = x, P: Array = P) -> Any:
-                return exact_lift.reduced_start(big(x), big(P), wrong=wrong)
-
             names = ["first-order"] if not flag else []
-            starts.append(case({"x": x, "P": P}, started, names, ("m", "P")))
+            starts.append(asked({"x": x, "P": P}, exact_lift.reduced_start, names, ("m", "P")))
             n = k % 3
             m = np.round([*x[:2], np.sin(x[2]), np.cos(x[2]), *rng.uniform(-9, 9, 2 * n)], 4)
             P = covariance(rng, np.array([0.3, 0.25, 0.1, 0.1, *[0.4] * (2 * n)]))
             moved, cov = increment(rng)
             cov = digits(9 * cov * scale**2)
-            args = [big(v) for v in (m, P, moved, cov)]
-
-            def stepped(wrong: str, args: list[Any] = args) -> Any:
-                return exact_lift.reduced_gaussian(*args, wrong=wrong)
-
             names = ["product-of-means"] if not flag and n else []
             inputs = {"m": m, "P": P, "increment": moved, "cov": cov}
-            steps.append(case(inputs, stepped, names, ("m", "P")))
+            steps.append(asked(inputs, exact_lift.reduced_gaussian, names, ("m", "P")))
         flags = (flag,) if flag else ()
         topic.group("reduced.start", "eq-gaussian-moments", oracle, rule, starts, flags=flags)
         topic.group("reduced.gaussian_predict", "eq-gaussian-moments", oracle, rule, steps, flags=flags)

@@ -36,9 +36,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Odd and even numbers, with outliers and without."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     rule = tolerance(1e-15, "a product of a constant of 16 digits and a median", float32=1e-6)
     for flag, first, outliers in (("odd", 5, False), ("even", 6, False), ("outliers", 9, True)):
         sizes = [first + 2 * k for k in range(8)]

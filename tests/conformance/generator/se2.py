@@ -9,6 +9,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import log_uniform
 from generator.exact import column, floats, integrated, vector
 from generator.groups import REGIMES, SE2, Array
 
@@ -40,9 +41,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     fine = tolerance(5e-14, ROUNDING)
     for flag in REGIMES:
         flags = () if flag == "generic" else (flag,)
@@ -66,8 +65,7 @@ def build(rng: np.random.Generator) -> Topic:
 
 
 def _twist(rng: np.random.Generator, flag: str) -> Array:
-    low, high = REGIMES[flag]
-    angle = rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(low), np.log(high)))
+    angle = rng.choice([-1, 1]) * log_uniform(rng, *REGIMES[flag])
     return np.array([*(rng.uniform(0.4, 3.0, 2) * rng.choice([-1.0, 1.0], 2)), angle])
 
 

@@ -62,9 +62,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for flag in REGIMES:
         _regime(topic, flag, [twist(rng, flag) for _ in range(8)])
     fine = tolerance(5e-14, ROUNDING)

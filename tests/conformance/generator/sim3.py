@@ -10,6 +10,7 @@ from mpmath import mpf
 
 from generator import exact
 from generator.building import Topic, tolerance
+from generator.draws import log_uniform
 from generator.exact import column, floats, integrated, matrix, vector
 from generator.groups import SIM3, Array, product, shift, turn
 from generator.se3 import ROUNDING, case
@@ -49,9 +50,7 @@ REGIMES: dict[str, tuple[str, float, float]] = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     fine = tolerance(5e-14, ROUNDING)
     for flag in REGIMES:
         flags = () if flag == "generic" else (flag,)
@@ -79,7 +78,7 @@ def build(rng: np.random.Generator) -> Topic:
 
 def _twist(rng: np.random.Generator, flag: str) -> Array:
     angle, low, high = REGIMES[flag]
-    sigma = rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(low), np.log(high)))
+    sigma = rng.choice([-1, 1]) * log_uniform(rng, low, high)
     return np.array([*shift(rng), *turn(rng, angle), sigma])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import log_uniform
 
 TOPIC, CHAPTER = "so2", 2
 
@@ -40,15 +41,11 @@ RANGES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Exponential and home interval."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     fine = tolerance(4e-16, "one sine and one cosine, each within an ulp", float32=2e-7)
     for flag, (low, high) in RANGES.items():
         flags = () if flag == "generic" else (flag,)
-        angles = [
-            float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(low), np.log(high)))) for _ in range(8)
-        ]
+        angles = [float(rng.choice([-1, 1]) * log_uniform(rng, low, high)) for _ in range(8)]
         cases = [_exp(a) for a in angles]
         topic.group("so2.exp", "eq-rodrigues", "50-digit sine and cosine", fine, cases, flags=flags)
         reason = "2 pi, rounded to a double, is taken off as often as the angle turns: eps times the angle"

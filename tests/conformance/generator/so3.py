@@ -10,6 +10,7 @@ from mpmath import mpf
 from scipy.stats import norm
 
 from generator.building import Topic, tolerance
+from generator.draws import rotation_vector
 from generator.exact import column, expm, floats, hat, matrix, vector
 from vslam_ref.arrays import Array
 
@@ -48,11 +49,9 @@ REGIMES: dict[str, tuple[float, float]] = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of rotations."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     for flag, (low, high) in REGIMES.items():
-        _regime(topic, flag, [_phi(rng, low, high) for _ in range(12)])
+        _regime(topic, flag, [rotation_vector(rng, low, high) for _ in range(12)])
     _ends(topic)
     near = tolerance(1e-13, "a logarithm and an exponential")
     topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, [_between(rng) for _ in range(15)])
@@ -89,12 +88,6 @@ def _ends(topic: Topic) -> None:
     reason = "R is rounded: near pi a rounding of eps can move the angle by its root, never the axis"
     rule = tolerance(3e-8, reason, float32=2e-3)
     topic.group("so3.log", "eq-log-rotation", "definition", rule, cases, flags=("pi",))
-
-
-def _phi(rng: np.random.Generator, low: float, high: float) -> Array:
-    axis = rng.standard_normal(3)
-    angle = np.exp(rng.uniform(np.log(low), np.log(high)))
-    return np.asarray(angle * axis / np.linalg.norm(axis))
 
 
 def _exp(phi: Array) -> dict[str, Any]:
@@ -178,7 +171,7 @@ def _half_turn(phi: Array) -> dict[str, Any]:
 
 
 def _between(rng: np.random.Generator) -> dict[str, Any]:
-    a, phi = _phi(rng, 0.2, 3.0), _phi(rng, 0.1, 2.9)
+    a, phi = rotation_vector(rng, 0.2, 3.0), rotation_vector(rng, 0.1, 2.9)
     fraction = float(rng.uniform(0.05, 0.95))
     A = expm(hat(vector(a)))
     Ra, Rb = np.array(floats(A)), np.array(floats(A * expm(hat(vector(phi)))))
@@ -188,7 +181,7 @@ def _between(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _nearest(rng: np.random.Generator) -> dict[str, Any]:
-    R = expm(hat(vector(_phi(rng, 0.2, 3.0))))
+    R = expm(hat(vector(rotation_vector(rng, 0.2, 3.0))))
     M = np.array(floats(R)) @ (np.diag(rng.uniform(0.5, 2.0, 3)) + 0.05 * rng.standard_normal((3, 3)))
     return {"inputs": {"M": M}, "expected": {"R": floats(polar(matrix(M)))}}
 

@@ -53,9 +53,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """ATE, RPE, and chains of steps."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     reason = (
         "errors of a tenth of a metre, from positions of some ten metres: 100 eps, and the alignment's gap"
     )

@@ -10,6 +10,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import log_uniform
 from generator.exact_arrays import Big, big, doubles, stack
 from generator.exact_ekf import increment, moved, rotation, wrapped
 
@@ -78,9 +79,7 @@ def front(x: Big, control: Big, wheelbase: Any, dt: Any) -> Big:
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of vehicle models."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     rule = tolerance(1e-14, "a dozen operations on numbers of the pose's size", absolute=1e-14)
     regimes: dict[str, tuple[int, Callable[[], list[Any]]]] = {
         "": (20, lambda: _inputs(rng, speed=(0.5, 15.0), steering=(0.05, 0.6))),
@@ -124,7 +123,7 @@ def _inputs(rng: np.random.Generator, speed: tuple[float, float], steering: tupl
     """Pose, control, wheelbase, track width, duration."""
     x = [*np.round(rng.uniform(-20, 20, 2), 3), round(rng.uniform(-2.5, 2.5), 4)]
     low, high = steering
-    angle = np.exp(rng.uniform(np.log(low), np.log(high))) * rng.choice([-1, 1]) if high > 0 else 0.0
+    angle = log_uniform(rng, low, high) * rng.choice([-1, 1]) if high > 0 else 0.0
     control = [round(rng.uniform(speed[0], speed[1]), 3), float(f"{angle:.4g}")]
     wheelbase = round(rng.uniform(0.8, 3.5), 2)
     dt = float(rng.choice([0.1, 0.025, 0.5]))

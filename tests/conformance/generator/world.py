@@ -9,13 +9,6 @@ import numpy as np
 from vslam_ref.arrays import Array
 
 
-def digits(values: Any, count: int = 12) -> Array:
-    """Numbers of so many digits: what linear algebra gives differs in its last ones between machines."""
-    rows = np.asarray(values, dtype=np.float64)
-    kept = [float(f"{v:.{count}g}") for v in rows.ravel().tolist()]
-    return np.array(kept).reshape(rows.shape)
-
-
 def covariance(rng: np.random.Generator, sigmas: Array) -> Array:
     """Symmetric positive definite matrix with standard deviations near ``sigmas``, correlated, 6 decimals.
 

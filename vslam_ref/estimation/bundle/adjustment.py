@@ -17,7 +17,7 @@ from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import projection, reduced_system, schur
 from vslam_ref.estimation.bundle.normal import Normal, normal_equations
 from vslam_ref.estimation.bundle.problem import BundleProblem
-from vslam_ref.estimation.bundle.projection import State
+from vslam_ref.estimation.bundle.projection import BundleState
 from vslam_ref.estimation.bundle.schur import Diagonals
 from vslam_ref.estimation.bundle.structure import Structure
 from vslam_ref.estimation.bundle.weights import Robust, Weighted, weigh
@@ -32,7 +32,7 @@ DAMPED = (1e-6, 1e32)
 class Place(NamedTuple):
     """A state with its residuals ``r (n, 2)`` (sorted), their validity ``valid (n,)``, and what they cost."""
 
-    state: State
+    state: BundleState
     r: Array
     valid: BoolArray
     weighted: Weighted
@@ -108,12 +108,12 @@ class Adjustment:
         uv = self.table.links.uv
         return len(uv) * (8.0 * schur.EPS * max(1.0, float(np.abs(uv).max(initial=0.0)))) ** 2
 
-    def at(self, state: State, sigma: float | None = None) -> Place:
+    def at(self, state: BundleState, sigma: float | None = None) -> Place:
         """Evaluate a state, at a given scale or at its own."""
         r, valid = projection.residuals(self.problem.model, state, self.table.links)
         return self.weighed(state, r, valid, sigma)
 
-    def weighed(self, state: State, r: Array, valid: BoolArray, sigma: float | None = None) -> Place:
+    def weighed(self, state: BundleState, r: Array, valid: BoolArray, sigma: float | None = None) -> Place:
         """Weigh the residuals of a state, at a given scale or at their own."""
         errors = self.table.whitened(r)
         used = self.robust.sigma(errors, valid & self.active) if sigma is None else sigma
@@ -154,7 +154,7 @@ class Adjustment:
         return place.weighted.costs
 
 
-def moved(problem: BundleProblem, state: State, step: Change) -> State | None:
+def moved(problem: BundleProblem, state: BundleState, step: Change) -> BundleState | None:
     """State after a step: Exp(xi) T, and sums; None where its intrinsics make no camera."""
     T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
     intrinsics = state.intrinsics.copy()
@@ -163,7 +163,7 @@ def moved(problem: BundleProblem, state: State, step: Change) -> State | None:
     if step.view.shape[1] > 6 and not possible(problem.model, intrinsics):
         return None
     R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
-    return State(R, t, state.X_world + step.point, intrinsics)
+    return BundleState(R, t, state.X_world + step.point, intrinsics)
 
 
 def possible(model: type[Camera], intrinsics: Array) -> bool:

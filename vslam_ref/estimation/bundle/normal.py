@@ -19,9 +19,9 @@ import numpy as np
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle.projection import (
+    BundleState,
     Linearised,
     Links,
-    State,
     is_polynomial,
     linearise,
     polynomial_params,
@@ -48,7 +48,7 @@ class Normal(NamedTuple):
 
 
 def normal_equations(
-    model: type[Camera], state: State, table: Structure, weights: Array, basis: Array
+    model: type[Camera], state: BundleState, table: Structure, weights: Array, basis: Array
 ) -> Normal:
     """Linearise at a state and add up.
 
@@ -57,7 +57,7 @@ def normal_equations(
     Parameters
     ----------
     model : type of Camera
-    state : State
+    state : BundleState
     table : Structure
     weights : ndarray, shape (n,)
         Of each observation, from the robust loss; 0 leaves it out.
@@ -111,7 +111,7 @@ def polynomial_normal(
         As in :class:`~vslam_ref.estimation.bundle.structure.Structure`.
     """
     links = Links(view, point, lens, uv)
-    state = State(R_cam_world, t_cam_world, X_world, params)
+    state = BundleState(R_cam_world, t_cam_world, X_world, params)
     return _blocks(linearise(Radtan, state, links, basis), U, links, offsets, view_order, view_offsets)
 
 

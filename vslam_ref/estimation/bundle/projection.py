@@ -37,7 +37,7 @@ POLYNOMIAL = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Intrinsics of the lenses that are written out; the pinhole has the first four."""
 
 
-class State(NamedTuple):
+class BundleState(NamedTuple):
     """What moves: rotations (V, 3, 3) and translations (V, 3) of the views, points (N, 3), lenses (L, p)."""
 
     R_cam_world: Array
@@ -91,7 +91,7 @@ def polynomial_params(intrinsics: Array) -> Array:
     return padded
 
 
-def residuals(model: type[Camera], state: State, links: Links) -> Residuals:
+def residuals(model: type[Camera], state: BundleState, links: Links) -> Residuals:
     """Residuals of all observations.
 
     Implements :eq:`eq-ba-residual`.
@@ -107,7 +107,7 @@ def residuals(model: type[Camera], state: State, links: Links) -> Residuals:
 def reprojection(problem: BundleProblem) -> Residuals:
     """Residuals of a problem's scene, in the problem's order."""
     seen, T = problem.seen, problem.scene.T_cam_world
-    state = State(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics)
+    state = BundleState(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics)
     links = Links(seen.view, seen.point, problem.lens_of_view[seen.view], seen.uv)
     return residuals(problem.model, state, links)
 
@@ -129,11 +129,11 @@ def polynomial_residuals(
     ``t_cam_world (V, 3)``, ``X_world (N, 3)``; ``view (n,)``, ``point (n,)``, ``lens (n,)``; ``uv (n, 2)``,
     pixels.
     """
-    seen = _polynomial(State(R_cam_world, t_cam_world, X_world, params), Links(view, point, lens, uv))
+    seen = _polynomial(BundleState(R_cam_world, t_cam_world, X_world, params), Links(view, point, lens, uv))
     return np.where(seen.front[:, None], seen.pixels() - uv, 0.0), seen.front
 
 
-def linearise(model: type[Camera], state: State, links: Links, basis: Array) -> Linearised:
+def linearise(model: type[Camera], state: BundleState, links: Links, basis: Array) -> Linearised:
     """Residuals and Jacobians of all observations.
 
     Implements :eq:`eq-ba-jacobians`.
@@ -141,7 +141,7 @@ def linearise(model: type[Camera], state: State, links: Links, basis: Array) -> 
     Parameters
     ----------
     model : type of Camera
-    state : State
+    state : BundleState
     links : Links
     basis : ndarray, shape (p, q)
         Directions in which a set of intrinsics may move.
@@ -241,7 +241,7 @@ class _Polynomial(NamedTuple):
         return fx * x * power, fy * y * power
 
 
-def _polynomial(state: State, links: Links) -> _Polynomial:
+def _polynomial(state: BundleState, links: Links) -> _Polynomial:
     """Points in their cameras, normalised, with radial factor and lens."""
     R, t, X_world = state.R_cam_world, state.t_cam_world, state.X_world
     world = [np.ascontiguousarray(X_world[:, axis])[links.point] for axis in range(3)]
@@ -260,7 +260,7 @@ def _polynomial(state: State, links: Links) -> _Polynomial:
     return _Polynomial(X, front, inverse_depth, x, y, q, G, k, bool(params[:, 6:8].any()))
 
 
-def _points_in_cameras(state: State, links: Links) -> Array:
+def _points_in_cameras(state: BundleState, links: Links) -> Array:
     """Point of each observation in the frame of its view, (n, 3)."""
     moved: Array = np.einsum("nij,nj->ni", state.R_cam_world[links.view], state.X_world[links.point])
     return moved + state.t_cam_world[links.view]

@@ -24,7 +24,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
-from vslam_ref.estimation.bundle.projection import Links, State
+from vslam_ref.estimation.bundle.projection import BundleState, Links
 from vslam_ref.estimation.bundle.weights import whitener
 
 
@@ -76,12 +76,12 @@ class Structure:
         """Residuals (n, 2) of the sorted observations, in standard deviations."""
         return np.einsum("nab,nb->na", self.whitener, r) if self.has_cov else r
 
-    def state(self, problem: BundleProblem) -> State:
+    def state(self, problem: BundleProblem) -> BundleState:
         """Start of the problem, its points sorted."""
         T = problem.scene.T_cam_world
         X = problem.scene.X_world[self.point_order]
         R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
-        return State(R, t, X, problem.scene.intrinsics)
+        return BundleState(R, t, X, problem.scene.intrinsics)
 
 
 def structure(problem: BundleProblem) -> Structure:

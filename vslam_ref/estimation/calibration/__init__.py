@@ -20,10 +20,10 @@ module              holds
 
 from vslam_ref.estimation.calibration import book, ptam
 from vslam_ref.estimation.calibration.arrow import reduce
-from vslam_ref.estimation.calibration.board import Board, Corners, View, stack
+from vslam_ref.estimation.calibration.board import Board, BoardCorners, BoardView, stack
 from vslam_ref.estimation.calibration.homography import apply_homography, homography
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import Problem, State
+from vslam_ref.estimation.calibration.problem import CalibrationProblem, CalibrationState
 from vslam_ref.estimation.calibration.result import Calibration, tilt
 from vslam_ref.estimation.calibration.robustly import RobustCalibration, calibrate_robustly
 from vslam_ref.estimation.calibration.solver import calibrate
@@ -33,14 +33,14 @@ from vslam_ref.estimation.calibration.zhang import Sensor, pose_from_homography,
 __all__ = [
     "Board",
     "Calibration",
-    "Corners",
+    "BoardCorners",
     "Free",
-    "Problem",
+    "CalibrationProblem",
     "RobustCalibration",
     "Sensor",
     "Start",
-    "State",
-    "View",
+    "CalibrationState",
+    "BoardView",
     "apply_homography",
     "book",
     "calibrate",

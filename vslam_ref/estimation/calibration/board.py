@@ -82,14 +82,14 @@ class Board:
         return self.square * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
 
 
-class View(NamedTuple):
+class BoardView(NamedTuple):
     """Corners of one image: where they are on the board (N, 3) and in the image (N, 2), pixels."""
 
     X_board: Array
     uv: Array
 
 
-class Corners(NamedTuple):
+class BoardCorners(NamedTuple):
     """All corners of all views, view after view.
 
     Attributes
@@ -114,19 +114,19 @@ class Corners(NamedTuple):
         """Number of views V."""
         return len(self.first)
 
-    def of(self, view: int) -> View:
+    def of(self, view: int) -> BoardView:
         """Corners of one view."""
         mine = self.view == view
-        return View(self.X_board[mine], self.uv[mine])
+        return BoardView(self.X_board[mine], self.uv[mine])
 
 
-def stack(views: Sequence[tuple[ArrayLike, ArrayLike]]) -> Corners:
+def stack(views: Sequence[tuple[ArrayLike, ArrayLike]]) -> BoardCorners:
     """Check views and put them into one table.
 
     Parameters
     ----------
     views : sequence of (X_board, uv)
-        :class:`View` or plain pairs, of shapes (N, 3) with z = 0, and (N, 2).  N may differ.
+        :class:`BoardView` or plain pairs, of shapes (N, 3) with z = 0, and (N, 2).  N may differ.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def stack(views: Sequence[tuple[ArrayLike, ArrayLike]]) -> Corners:
     for number, (X, uv) in enumerate(pairs):
         _check(number, X, uv)
     counts = np.array([len(X) for X, _ in pairs])
-    return Corners(
+    return BoardCorners(
         np.concatenate([X for X, _ in pairs]),
         np.concatenate([uv for _, uv in pairs]),
         np.repeat(np.arange(len(pairs)), counts),

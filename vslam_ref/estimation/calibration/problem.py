@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import Arrow, ArrowVector, arrow, damped_step, promised
-from vslam_ref.estimation.calibration.board import Corners
+from vslam_ref.estimation.calibration.board import BoardCorners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.least_squares import Step
 from vslam_ref.estimation.robust import Loss
@@ -18,7 +18,7 @@ from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Lens, projection
 
 
-class State(NamedTuple):
+class CalibrationState(NamedTuple):
     """What is estimated.
 
     Attributes
@@ -60,7 +60,7 @@ class CalibrationIterate(NamedTuple):
 
     Attributes
     ----------
-    state : State
+    state : CalibrationState
     residual : ndarray, shape (M, 2)
         Predicted minus measured, pixels.
     costs : ndarray, shape (M,)
@@ -77,7 +77,7 @@ class CalibrationIterate(NamedTuple):
         1: in the metric D all columns are as long.
     """
 
-    state: State
+    state: CalibrationState
     residual: Array
     costs: Array
     weights: Array
@@ -106,7 +106,7 @@ def residual(
     T_cam_board : array_like, shape (..., 4, 4)
         Pose of the board for each corner.
     X_board : array_like, shape (..., 3)
-        Corners.
+        Corners, metres.
     uv : array_like, shape (..., 2)
         Measured pixels.
     lens : Lens
@@ -134,14 +134,14 @@ def residual_with_jacobians(
 
 
 @dataclass(frozen=True)
-class Problem:
+class CalibrationProblem:
     """Corners, a camera model with its free parameters, and a loss: what a descent asks of a calibration."""
 
-    corners: Corners
+    corners: BoardCorners
     free: Free
     loss: Loss
 
-    def costs(self, state: State) -> Array:
+    def costs(self, state: CalibrationState) -> Array:
         """Cost of each corner (M,); infinite where the camera does not see it.
 
         Implements :eq:`eq-calibration-cost`, term by term.
@@ -151,7 +151,9 @@ class Problem:
         length = np.linalg.norm(r, axis=1)
         return np.where(np.isfinite(length), self.loss.cost(length), np.inf)
 
-    def linearise(self, state: State, before: CalibrationIterate | None = None) -> CalibrationIterate | None:
+    def linearise(
+        self, state: CalibrationState, before: CalibrationIterate | None = None
+    ) -> CalibrationIterate | None:
         """Costs and normal equations, or None where the state is no camera that sees all corners."""
         if not self._is_camera(state):
             return None
@@ -178,17 +180,17 @@ class Problem:
         promise = promised(here.normal, change, damping, here.scale)
         return Step(change, length, promise, length / here.scale.norm)
 
-    def move(self, here: CalibrationIterate, step: Step) -> State | None:
+    def move(self, here: CalibrationIterate, step: Step) -> CalibrationState | None:
         """State after a step; None where its intrinsics make no camera."""
         there = self.plus(here.state, step.change)
         return there if self._is_camera(there) else None
 
-    def plus(self, state: State, change: ArrowVector) -> State:
+    def plus(self, state: CalibrationState, change: ArrowVector) -> CalibrationState:
         """Step: T <- Exp(xi) T for each pose, and a sum for the intrinsics."""
         T = se3.perturb(state.T_cam_board, change.pose)
-        return State(state.params + self.free.basis @ change.free, T)
+        return CalibrationState(state.params + self.free.basis @ change.free, T)
 
-    def _is_camera(self, state: State) -> bool:
+    def _is_camera(self, state: CalibrationState) -> bool:
         try:
             self.free.model.from_params(state.params)
         except ValueError:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vslam_ref.estimation.calibration.arrow import ArrowVector, damped_step
-from vslam_ref.estimation.calibration.problem import CalibrationIterate, Problem, State
+from vslam_ref.estimation.calibration.problem import CalibrationIterate, CalibrationProblem, CalibrationState
 
 SHARE = 0.1
 """Of the step that is taken."""
@@ -18,14 +18,16 @@ PRIOR = 1.0
 """What is added to the diagonal of J^T J."""
 
 
-def ptam_step(problem: Problem, here: CalibrationIterate, size: tuple[int, int]) -> State:
+def ptam_step(
+    problem: CalibrationProblem, here: CalibrationIterate, size: tuple[int, int]
+) -> CalibrationState:
     """State after one step.
 
     Implements :eq:`eq-ptam-step`.
 
     Parameters
     ----------
-    problem : Problem
+    problem : CalibrationProblem
         PTAM's own has the FOV lens; any other works too.
     here : CalibrationIterate
         The problem at the state before.

@@ -9,7 +9,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.arrow import reduce
-from vslam_ref.estimation.calibration.board import Corners
+from vslam_ref.estimation.calibration.board import BoardCorners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import CalibrationIterate
 from vslam_ref.estimation.calibration.start import Start
@@ -37,7 +37,7 @@ class Calibration:
     camera : Camera
     T_cam_board : ndarray, shape (V, 4, 4)
         Pose of the board in each view, in the unit of the board.
-    corners : Corners
+    corners : BoardCorners
         What was given.
     residual : ndarray, shape (M, 2)
         Predicted minus measured, pixels.
@@ -58,7 +58,7 @@ class Calibration:
 
     camera: Camera
     T_cam_board: Array
-    corners: Corners
+    corners: BoardCorners
     residual: Array
     weights: Array
     sigma_px: float

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.estimation.calibration.board import Corners, stack
+from vslam_ref.estimation.calibration.board import BoardCorners, stack
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import CalibrationIterate, Problem
+from vslam_ref.estimation.calibration.problem import CalibrationIterate, CalibrationProblem
 from vslam_ref.estimation.calibration.result import Calibration, certainty
 from vslam_ref.estimation.calibration.start import Start, find_start, state_of
 from vslam_ref.estimation.least_squares import Descent, Options, descend
@@ -93,7 +93,7 @@ def calibrate(
     _enough(corners, free)
     start = start or find_start(corners, size, free)
     _fits(start, corners, free)
-    problem = Problem(corners, free, loss or L2())
+    problem = CalibrationProblem(corners, free, loss or L2())
     here = problem.linearise(state_of(start, free))
     if here is None:
         raise ValueError("start: its camera does not see every corner at these poses")
@@ -102,7 +102,7 @@ def calibrate(
     return _result(corners, free, start, end)
 
 
-def _result(corners: Corners, free: Free, start: Start, end: Descent[CalibrationIterate]) -> Calibration:
+def _result(corners: BoardCorners, free: Free, start: Start, end: Descent[CalibrationIterate]) -> Calibration:
     sure = certainty(end.here, free)
     return Calibration(
         camera=free.model.from_params(end.here.state.params),
@@ -122,7 +122,7 @@ def _result(corners: Corners, free: Free, start: Start, end: Descent[Calibration
     )
 
 
-def _enough(corners: Corners, free: Free) -> None:
+def _enough(corners: BoardCorners, free: Free) -> None:
     """Refuse fewer views than a sensor without distortion needs: each gives two equations."""
     wanted = [name for name in free.names if name in ("fx", "fy", "cx", "cy")]
     if 2 * corners.views < len(wanted):
@@ -135,7 +135,7 @@ def _enough(corners: Corners, free: Free) -> None:
         raise ValueError(f"{len(corners.uv)} corners give two numbers each, for {unknowns} unknowns")
 
 
-def _fits(start: Start, corners: Corners, free: Free) -> None:
+def _fits(start: Start, corners: BoardCorners, free: Free) -> None:
     if type(start.camera) is not free.model:
         raise ValueError(f"start: its camera is a {type(start.camera).__name__}, not a {free.model.__name__}")
     if np.shape(start.T_cam_board) != (corners.views, 4, 4):

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.calibration.board import LEAST_CORNERS, Corners
+from vslam_ref.estimation.calibration.board import LEAST_CORNERS, BoardCorners
 from vslam_ref.estimation.calibration.homography import homography
 from vslam_ref.estimation.calibration.parameters import Free
-from vslam_ref.estimation.calibration.problem import State, residual
+from vslam_ref.estimation.calibration.problem import CalibrationState, residual
 from vslam_ref.estimation.calibration.zhang import pose_from_homography, sensor_from_homographies
 from vslam_ref.geometry.cameras import Camera
 
@@ -43,12 +43,12 @@ class Start(NamedTuple):
     rms_px: float
 
 
-def find_start(corners: Corners, size: tuple[int, int], free: Free) -> Start:
+def find_start(corners: BoardCorners, size: tuple[int, int], free: Free) -> Start:
     """Best of some candidate cameras.
 
     Parameters
     ----------
-    corners : Corners
+    corners : BoardCorners
     size : (int, int)
         Width and height of the images, pixels; a candidate's principal point is their centre.
     free : Free
@@ -76,7 +76,7 @@ def find_start(corners: Corners, size: tuple[int, int], free: Free) -> Start:
     return best
 
 
-def _candidates(corners: Corners, size: tuple[int, int], free: Free) -> Iterator[Array]:
+def _candidates(corners: BoardCorners, size: tuple[int, int], free: Free) -> Iterator[Array]:
     """Intrinsics to try."""
     centre = [(size[0] - 1) / 2, (size[1] - 1) / 2]
     sensors = [[share * max(size)] * 2 + centre for share in FOCAL_SHARES]
@@ -90,12 +90,12 @@ def _candidates(corners: Corners, size: tuple[int, int], free: Free) -> Iterator
             yield free.apply(np.array([*sensor, *lens]))
 
 
-def poses_for(corners: Corners, params: Array, model: type[Camera]) -> Start | None:
+def poses_for(corners: BoardCorners, params: Array, model: type[Camera]) -> Start | None:
     """Pose of each view for a known camera, by homography; None where it has no ray for enough corners.
 
     Parameters
     ----------
-    corners : Corners
+    corners : BoardCorners
     params : ndarray, shape (n,)
         Intrinsics; focal lengths and centre in pixels.
     model : type
@@ -120,6 +120,6 @@ def poses_for(corners: Corners, params: Array, model: type[Camera]) -> Start | N
     return Start(camera, T_cam_board, rms) if np.isfinite(rms) else None
 
 
-def state_of(start: Start, free: Free) -> State:
+def state_of(start: Start, free: Free) -> CalibrationState:
     """The start as a state, with the fixed parameters put in."""
-    return State(free.apply(start.camera.params), start.T_cam_board)
+    return CalibrationState(free.apply(start.camera.params), start.T_cam_board)

@@ -54,7 +54,7 @@ class SparsityConfig:
             raise ValueError(f"views={self.views}: need three or more rising numbers from 10 on")
 
 
-class Arrow(NamedTuple):
+class DrawnSystem(NamedTuple):
     """One drawn problem: H, its columns of views first, and its factors.
 
     Attributes
@@ -77,7 +77,7 @@ class Arrow(NamedTuple):
     real: bool
 
 
-class Counts(NamedTuple):
+class OperationCounts(NamedTuple):
     """Operations of one problem, by order of elimination.
 
     ``points_first`` and ``views_first`` are measured, ``predicted`` is for the former; ``whole`` is the
@@ -157,7 +157,7 @@ def point_columns(problem: BundleProblem) -> tuple[IntArray, int]:
     return np.bincount(problem.seen.point, minlength=problem.sizes[1]), 6 + problem.free.intrinsics.shape[1]
 
 
-def arrow(problem: BundleProblem, real: bool, config: SparsityConfig) -> Arrow:
+def arrow(problem: BundleProblem, real: bool, config: SparsityConfig) -> DrawnSystem:
     """The drawn matrices."""
     from scipy.sparse import csc_array
 
@@ -172,7 +172,7 @@ def arrow(problem: BundleProblem, real: bool, config: SparsityConfig) -> Arrow:
     everything = np.arange(H.shape[0])
     orders = (np.concatenate([everything[D:], everything[:D]]), everything)
     patterns = [factor_pattern(H, order).toarray() != 0 for order in orders]
-    return Arrow(H.toarray(), patterns[0], patterns[1], sees, d, real)
+    return DrawnSystem(H.toarray(), patterns[0], patterns[1], sees, d, real)
 
 
 def _normal(problem: BundleProblem) -> tuple[Normal, Structure]:
@@ -192,7 +192,7 @@ def views_system(problem: BundleProblem) -> tuple[Array, IntArray]:
     return S[np.ix_(own, own)], np.argsort(own)
 
 
-def count_orders(problem: BundleProblem, config: SparsityConfig) -> Counts:
+def count_orders(problem: BundleProblem, config: SparsityConfig) -> OperationCounts:
     """Points first and views first, on a part of the problem."""
     chosen = np.arange(min(config.counted, problem.sizes[1]))
     part = with_points(problem, chosen)
@@ -202,7 +202,7 @@ def count_orders(problem: BundleProblem, config: SparsityConfig) -> Counts:
     everything = np.arange(H.shape[0])
     first = elimination_cost(H, np.concatenate([everything[D:], everything[:D]]))[0]
     last = elimination_cost(H, everything)[0]
-    return Counts(first, point_cost(seen, d) + dense_cost(D), last, dense_cost(len(everything)))
+    return OperationCounts(first, point_cost(seen, d) + dense_cost(D), last, dense_cost(len(everything)))
 
 
 def simulate(config: SparsityConfig, views: int, unit: None) -> Walk:

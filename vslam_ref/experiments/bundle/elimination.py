@@ -14,18 +14,18 @@ import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle import BundleProblem, Scene
-from vslam_ref.estimation.bundle.projection import Links, State, linearise, reprojection
+from vslam_ref.estimation.bundle.projection import BundleState, Links, linearise, reprojection
 from vslam_ref.geometry import se3
 
 DAMPING = 1e-3
 """Share of the diagonal that is added, so that the factor exists with a free gauge."""
 
 
-def state_and_links(problem: BundleProblem) -> tuple[State, Links]:
+def state_and_links(problem: BundleProblem) -> tuple[BundleState, Links]:
     """Scene and observations of a problem, in its own order, for the functions of ``projection``."""
     T, seen = problem.scene.T_cam_world, problem.seen
     links = Links(seen.view, seen.point, problem.lens_of_view[seen.view], seen.uv)
-    return State(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics), links
+    return BundleState(T[:, :3, :3], T[:, :3, 3], problem.scene.X_world, problem.scene.intrinsics), links
 
 
 def differenced(problem: BundleProblem) -> Array:

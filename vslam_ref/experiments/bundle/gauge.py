@@ -108,9 +108,8 @@ def _seven(predicted: Predicted) -> Claim:
         f"of the singular values of the free Jacobian (columns of length 1, the largest 1), exactly 7 are <= "
         f"{ZERO:g} and the eighth is >= {SEEN:g}; moving and enlarging the world changes no pixel by 1e-9",
         zeros == 7 and eighth >= SEEN and predicted.invisible < 1e-9,
-        f"{zeros} singular values of the Jacobian are zero to rounding (the seventh is {seventh:.1e}, the "
-        "eighth "
-        f"{eighth:.1e} of the largest), and moving the whole world changes no pixel by more than "
+        f"Of the Jacobian's singular values {zeros} are zero to rounding (the seventh is {seventh:.1e}, the "
+        f"eighth {eighth:.1e} of the largest), and moving the whole world changes no pixel by more than "
         f"{predicted.invisible:.1e}",
         {"zeros": zeros, "eighth": eighth, "seventh": seventh, "px": predicted.invisible},
     )

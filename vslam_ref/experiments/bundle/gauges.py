@@ -23,7 +23,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle import BundleProblem, Freedom, Options, Scene, bundle_adjust, freedom
 from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.estimation.bundle.gauge import fix_gauge
-from vslam_ref.estimation.bundle.projection import Links, State, linearise, reprojection
+from vslam_ref.estimation.bundle.projection import BundleState, Links, linearise, reprojection
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.experiments.framework.driver import stack
 from vslam_ref.geometry import camera_pose
@@ -236,7 +236,9 @@ def free_jacobian(bundle: Bundle) -> Array:
     T, X, K = bundle.truth.T_cam_world, bundle.truth.X_world, bundle.truth.intrinsics
     problem = bundle.problem(bundle.uv, bundle.truth)
     links = Links(bundle.view, bundle.point, problem.lens_of_view[bundle.view], bundle.uv)
-    at = linearise(problem.model, State(T[:, :3, :3], T[:, :3, 3], X, K), links, problem.free.intrinsics)
+    at = linearise(
+        problem.model, BundleState(T[:, :3, :3], T[:, :3, 3], X, K), links, problem.free.intrinsics
+    )
     n, V = len(bundle.uv), len(T)
     J = np.zeros((n, 2, 6 * V + 3 * len(X)))
     row = np.arange(n)[:, None]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.bundle.counts import (
-    Arrow,
-    Counts,
+    DrawnSystem,
+    OperationCounts,
     SparsityConfig,
     Walk,
     arrow,
@@ -43,18 +43,18 @@ SAME = 1e-9
 """Relative difference of two solutions of one system."""
 
 
-class Drawn(NamedTuple):
+class DrawnProblem(NamedTuple):
     """What is drawn and counted of the one problem: sizes are views, points and observations."""
 
     sizes: tuple[int, int, int]
-    arrow: Arrow
-    counts: Counts
+    arrow: DrawnSystem
+    counts: OperationCounts
 
 
-def drawn(config: SparsityConfig) -> Drawn:
+def drawn(config: SparsityConfig) -> DrawnProblem:
     """Draw and count."""
     problem, real = real_problem(config)
-    return Drawn(problem.sizes, arrow(problem, real, config), count_orders(problem, config))
+    return DrawnProblem(problem.sizes, arrow(problem, real, config), count_orders(problem, config))
 
 
 def walks(study: Study[Walk]) -> Walk:
@@ -82,14 +82,14 @@ def claims(study: Study[Walk]) -> list[Claim]:
     return [_arrow(study.once.arrow), _fill(w), _order(study.once.counts), _growth(w), _band(w)]
 
 
-def blocks(arrow: Arrow) -> NDArray[np.bool_]:
+def blocks(arrow: DrawnSystem) -> NDArray[np.bool_]:
     """Which blocks of H hold a number, (V + N, V + N)."""
     V, N = arrow.sees.shape
     edges = np.concatenate([arrow.d * np.arange(V), arrow.d * V + 3 * np.arange(N)])
     return np.add.reduceat(np.add.reduceat(np.abs(arrow.H), edges, axis=0), edges, axis=1) > 0.0
 
 
-def _arrow(arrow: Arrow) -> Claim:
+def _arrow(arrow: DrawnSystem) -> Claim:
     V, N = arrow.sees.shape
     full = blocks(arrow)
     views = int(np.sum(full[:V, :V])) - V
@@ -125,7 +125,7 @@ def _fill(w: Walk) -> Claim:
     )
 
 
-def _order(c: Counts) -> Claim:
+def _order(c: OperationCounts) -> Claim:
     off = abs(c.points_first / c.predicted - 1.0)
     return judged(
         "points-first",
@@ -204,7 +204,7 @@ def figure(study: Study[Walk]) -> Figure:
     """The arrow, its two factors, the walk's S in two orders, and operations against length."""
     from vslam_ref.plot.bundle_sparsity import sparsity_figure
 
-    found: Arrow = study.once.arrow
+    found: DrawnSystem = study.once.arrow
     S, by_rank = views_system(walk(study.config, study.config.views[1]))
     return sparsity_figure(
         found.H,

@@ -22,7 +22,7 @@ Work = Sequence[tuple[Experiment[Any], Any]]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Reproduced:
     """One experiment that has been run and written."""
 
     experiment: Experiment[Any]
@@ -42,7 +42,7 @@ def reproduce(
     out: Path,
     quick: bool = False,
     begin: Callable[[int, Experiment[Any]], None] | None = None,
-) -> Iterator[Outcome]:
+) -> Iterator[Reproduced]:
     """Run each (experiment, config) in turn; write ``out/<id>`` and renew ``out/index.html`` after each.
 
     Experiments that simulate the same with the same config, one after the other, share their runs.  Finished
@@ -63,7 +63,7 @@ def reproduce(
 
     Yields
     ------
-    Outcome
+    Reproduced
         As soon as its files are in place.
     """
     out = files.require_folder(out)
@@ -86,11 +86,13 @@ def reproduce(
         shared[2].remove()
 
 
-def _write(experiment: Experiment[Any], study: Study[Any], out: Path, seconds: float, quick: bool) -> Outcome:
+def _write(
+    experiment: Experiment[Any], study: Study[Any], out: Path, seconds: float, quick: bool
+) -> Reproduced:
     """Judge, draw and write one experiment."""
     claims = experiment.judge(study, quick)
     folder = out / experiment.id
     content = writer.document(experiment, study, claims, seconds, quick)
     writer.write_folder(folder, content, experiment.arrays(study), experiment.figure(study))
     report.write_index(out)
-    return Outcome(experiment, claims, folder, content["seed"], content["runs"], seconds, quick)
+    return Reproduced(experiment, claims, folder, content["seed"], content["runs"], seconds, quick)

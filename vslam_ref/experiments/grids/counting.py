@@ -87,7 +87,7 @@ class SeparationConfig:
             raise ValueError(f"densities={self.densities}: must hold 0 and the judged crowd {JUDGED}")
 
 
-class Counts(NamedTuple):
+class CellCounts(NamedTuple):
     """Counts of one run.
 
     Attributes
@@ -133,7 +133,7 @@ def precision_recall(count: Array) -> Array:
     return np.stack([precision, recall], -1)
 
 
-def measure(recording: Recording, config: SeparationConfig) -> Counts:
+def measure(recording: Recording, config: SeparationConfig) -> CellCounts:
     """Draw all maps of one recording from true poses, and count."""
     cells = cover(recording, resolution=config.map.resolution)
     separated, plain = StaticDynamicMap(config.map), PlainMap(config.plain)
@@ -153,4 +153,4 @@ def measure(recording: Recording, config: SeparationConfig) -> Counts:
             moving += counts(says, now, truth.moving, seen.ended & truth.moving)
     counted, asked = met >= config.looks, last & (ended >= config.looks)
     static = [counts(decided(m, cells), counted, last, asked) for m in (separated.static(), plain.occupied())]
-    return Counts(np.stack(static), moving, np.array(recording.share_on_people))
+    return CellCounts(np.stack(static), moving, np.array(recording.share_on_people))

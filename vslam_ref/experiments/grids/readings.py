@@ -15,7 +15,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, between, judged
 from vslam_ref.experiments.framework.statistics import interval_of_means, null_rate
-from vslam_ref.experiments.grids.counting import Counts, SeparationConfig, measure, precision_recall
+from vslam_ref.experiments.grids.counting import CellCounts, SeparationConfig, measure, precision_recall
 from vslam_ref.grids.inverse_sensor import Where
 from vslam_ref.grids.map_config import Memory
 from vslam_ref.worlds import floor_plan
@@ -53,7 +53,7 @@ class ReadingsConfig:
             raise ValueError(f"runs={self.runs}: need at least 2")
 
 
-def simulate(config: ReadingsConfig, point: None, seed: np.random.SeedSequence) -> Counts:
+def simulate(config: ReadingsConfig, point: None, seed: np.random.SeedSequence) -> CellCounts:
     """One recording, drawn by all four readings: ``static`` (4, 4) of S, ``moving`` (4, 4) of D."""
     count = config.count
     recording = floor_plan.simulate(count.world, np.random.default_rng(seed))
@@ -61,12 +61,12 @@ def simulate(config: ReadingsConfig, point: None, seed: np.random.SeedSequence) 
     for memory, where in READINGS:
         changed = dataclasses.replace(count.map, d_memory=memory, d_high_where=where)
         runs.append(measure(recording, dataclasses.replace(count, map=changed)))
-    return Counts(
+    return CellCounts(
         np.stack([r.static[0] for r in runs]), np.stack([r.moving for r in runs]), runs[0].on_people
     )
 
 
-def series(study: Study[Counts]) -> dict[str, object]:
+def series(study: Study[CellCounts]) -> dict[str, object]:
     """Means over the runs, by reading."""
     return {
         "readings": [f"{memory}-{where}" for memory, where in READINGS],
@@ -82,7 +82,7 @@ def f1(moving: Array) -> Array:
     return np.where(total > 0, 2 * both.prod(axis=-1) / np.maximum(total, 1e-300), 0.0)
 
 
-def claims(study: Study[Counts]) -> list[Claim]:
+def claims(study: Study[CellCounts]) -> list[Claim]:
     """Judge what A says of D, and what the readings have in common."""
     values, recall = f1(study.data.moving), precision_recall(study.data.moving)[..., 1]
     return [
@@ -113,7 +113,7 @@ def _undetermined(recall: Array, rng: np.random.Generator) -> Claim:
     )
 
 
-def _free(values: Array, study: Study[Counts]) -> Claim:
+def _free(values: Array, study: Study[CellCounts]) -> Claim:
     """What A must have meant."""
     pairs = [(_column(m, "free"), _column(m, "unknown")) for m in ("text", "formula")]
     gains = [values[:, better] - values[:, worse] for better, worse in pairs]
@@ -189,7 +189,7 @@ def _same_s(static: Array) -> Claim:
     )
 
 
-def figure(study: Study[Counts]) -> Figure:
+def figure(study: Study[CellCounts]) -> Figure:
     """Precision and recall of D for the four readings."""
     from vslam_ref.plot.grids import readings_figure
 

@@ -10,7 +10,13 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.framework.statistics import interval_of_means, null_rate
-from vslam_ref.experiments.grids.counting import JUDGED, Counts, SeparationConfig, measure, precision_recall
+from vslam_ref.experiments.grids.counting import (
+    JUDGED,
+    CellCounts,
+    SeparationConfig,
+    measure,
+    precision_recall,
+)
 from vslam_ref.worlds import floor_plan
 
 if TYPE_CHECKING:
@@ -22,7 +28,7 @@ STATIC_AIM, MOVING_AIM = 0.97, 0.85
 CROWD = f"in a crowd of {JUDGED:.0%}"
 
 
-def simulate(config: SeparationConfig, density: float, seed: np.random.SeedSequence) -> Counts:
+def simulate(config: SeparationConfig, density: float, seed: np.random.SeedSequence) -> CellCounts:
     """One run at one density; run r has the same seed, and so the same wishes of people, at each of them."""
     crowd = dataclasses.replace(config.world.crowd, density=density)
     world = dataclasses.replace(config.world, crowd=crowd)
@@ -30,7 +36,7 @@ def simulate(config: SeparationConfig, density: float, seed: np.random.SeedSeque
     return measure(floor_plan.turned(recording, config.turn) if config.turn else recording, config)
 
 
-def series(study: Study[Counts]) -> dict[str, object]:
+def series(study: Study[CellCounts]) -> dict[str, object]:
     """Means over the runs, by density."""
     return {
         "density": study.config.densities,
@@ -40,7 +46,7 @@ def series(study: Study[Counts]) -> dict[str, object]:
     }
 
 
-def claims(study: Study[Counts]) -> list[Claim]:
+def claims(study: Study[CellCounts]) -> list[Claim]:
     """Judge the aims at 20 % crowd, and the separation against the plain grid."""
     j = study.config.densities.index(JUDGED)
     S, plain = np.swapaxes(precision_recall(study.data.static[j]), 0, 1)
@@ -55,7 +61,7 @@ def claims(study: Study[Counts]) -> list[Claim]:
     ]
 
 
-def _aim(study: Study[Counts], id: str, text: str, values: Array, aim: float, draw: int) -> Claim:
+def _aim(study: Study[CellCounts], id: str, text: str, values: Array, aim: float, draw: int) -> Claim:
     mean = float(values.mean())
     which, what = id.split("-")
     return judged(
@@ -72,7 +78,7 @@ def _aim(study: Study[Counts], id: str, text: str, values: Array, aim: float, dr
     )
 
 
-def _cleaner(study: Study[Counts], S: Array, plain: Array) -> Claim:
+def _cleaner(study: Study[CellCounts], S: Array, plain: Array) -> Claim:
     """S keeps fewer smears of people than a plain grid."""
     gain = S[:, 0] - plain[:, 0]
     interval = interval_of_means(gain, study.rng(5))
@@ -83,7 +89,7 @@ def _cleaner(study: Study[Counts], S: Array, plain: Array) -> Claim:
         f"In a crowd of {JUDGED:.0%} the separated static map holds fewer cells that are not static",
         "precision of S minus that of the plain grid, same runs: 95 % whole-run interval > 0",
         interval[0] > 0,
-        f"{means['separated']:.1%} of the cells that S calls static are static, of a plain grid's "
+        f"Of the cells that S calls static {means['separated']:.1%} are static, of a plain grid's "
         f"{means['plain']:.1%}; the gain lies between {interval[0]:.1%} and {interval[1]:.1%} (95 %)",
         means,
         ci=interval,
@@ -92,7 +98,7 @@ def _cleaner(study: Study[Counts], S: Array, plain: Array) -> Claim:
     )
 
 
-def _no_loss(study: Study[Counts], S: Array, plain: Array) -> Claim:
+def _no_loss(study: Study[CellCounts], S: Array, plain: Array) -> Claim:
     """The price: S must find as many walls as the plain grid does."""
     loss = plain[:, 1] - S[:, 1]
     interval = interval_of_means(loss, study.rng(6))
@@ -113,7 +119,7 @@ def _no_loss(study: Study[Counts], S: Array, plain: Array) -> Claim:
     )
 
 
-def figure(study: Study[Counts]) -> Figure:
+def figure(study: Study[CellCounts]) -> Figure:
     """Precision and recall over the crowd's density."""
     from vslam_ref.plot.floor_plan import separation_figure
 

@@ -69,7 +69,7 @@ class ErrataConfig:
             raise ValueError(f"laps={self.laps}: must be in (0, {self.study.field.laps}]")
 
 
-class Outcome(NamedTuple):
+class ErrataRun(NamedTuple):
     """NEES (M, T + 1), and the lifted sum z5 + z6 (M,) at the end."""
 
     nees: Array
@@ -78,7 +78,7 @@ class Outcome(NamedTuple):
 
 def simulate(
     config: ErrataConfig, point: tuple[str, str], seeds: tuple[np.random.SeedSequence, ...]
-) -> Outcome:
+) -> ErrataRun:
     """Run one variant from one P0 over all runs."""
     variant, start = point
     world = part_of(config, 0.0 if variant.endswith("along the axes") else config.turn)
@@ -97,7 +97,7 @@ def simulate(
     with np.errstate(all="ignore"):
         nees = errors_of(slam, world, noise).nees
     z = slam.state()[0]
-    return Outcome(nees, z[:, 4] + z[:, 5])
+    return ErrataRun(nees, z[:, 4] + z[:, 5])
 
 
 def part_of(config: ErrataConfig, angle: float) -> VehicleField:
@@ -113,7 +113,7 @@ def part_of(config: ErrataConfig, angle: float) -> VehicleField:
     )
 
 
-Runs = Study[dict[str, Outcome]]
+Runs = Study[dict[str, ErrataRun]]
 
 
 def series(study: Runs) -> dict[str, object]:

@@ -20,7 +20,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class ClaimEvaluation:
     """Everything that was computed for one claim; arrays run over drawn studies of B's size.
 
     Attributes
@@ -80,7 +80,7 @@ class _Null:
 
 def evaluate_all(
     sentences: Sequence[Sentence], data: Series, control: Series, clock: StudyClock, rng: np.random.Generator
-) -> list[Evaluation]:
+) -> list[ClaimEvaluation]:
     """Evaluate claims on the per-run arrays of a study.
 
     Parameters
@@ -96,7 +96,7 @@ def evaluate_all(
 
     Returns
     -------
-    list of Evaluation
+    list of ClaimEvaluation
     """
     if not sentences:
         return []
@@ -116,7 +116,7 @@ def evaluate_all(
         shares = s.rule.holds(nested[s.id], threshold).reshape(worlds.OUTER, worlds.INNER).mean(axis=1)
         pointwise = s.rule.naive
         evaluations.append(
-            Evaluation(
+            ClaimEvaluation(
                 sentence=s,
                 threshold=threshold,
                 own=float(s.rule.measure.compute(worlds.as_is(s.rule, own), clock)[0]),

@@ -91,7 +91,7 @@ class SensitivityConfig:
             raise ValueError(f"study.filters={self.study.filters}: need {', '.join(sorted(needed))}")
 
 
-class Setting(NamedTuple):
+class StudySetting(NamedTuple):
     """One column of the map: its axis, its value in words, its place on a numeric axis, its study."""
 
     axis: str
@@ -105,15 +105,15 @@ class Setting(NamedTuple):
         return self.axis if self.axis == BASELINE else f"{self.axis} {self.label}"
 
 
-def settings_of(config: SensitivityConfig) -> list[Setting]:
+def settings_of(config: SensitivityConfig) -> list[StudySetting]:
     """All settings of a grid, the baseline first, in the order of :data:`AXES`."""
     base = config.study
     field = base.field
 
-    def world(axis: str, label: str, value: float, **changes: Any) -> Setting:
-        return Setting(axis, label, value, replace(base, field=replace(field, **changes)))
+    def world(axis: str, label: str, value: float, **changes: Any) -> StudySetting:
+        return StudySetting(axis, label, value, replace(base, field=replace(field, **changes)))
 
-    found = [Setting(BASELINE, "-", 0.0, base)]
+    found = [StudySetting(BASELINE, "-", 0.0, base)]
     found += [world("sigma_v", f"{v:g}", v, sigma_v=v) for v in config.sigma_v]
     found += [world("sigma_phi", f"{np.rad2deg(v):.3g}", v, sigma_phi=v) for v in config.sigma_phi]
     found += [world("sigma_z", f"{v:g}", v, sigma_z=v) for v in config.sigma_z]
@@ -125,12 +125,12 @@ def settings_of(config: SensitivityConfig) -> list[Setting]:
     found += [world("max_range", f"{v:g}", v, max_range=v) for v in config.max_range]
     found += [world("landmarks", f"{v}", v, landmarks=v) for v in config.landmarks]
     found += [
-        Setting("heading_variance", f"{v:g}", v, replace(base, p0_high=(*base.p0_high[:2], v)))
+        StudySetting("heading_variance", f"{v:g}", v, replace(base, p0_high=(*base.p0_high[:2], v)))
         for v in config.heading_variance
     ]
-    found += [Setting("layout", f"#{s}", s, replace(base, layout=s)) for s in config.layouts]
+    found += [StudySetting("layout", f"#{s}", s, replace(base, layout=s)) for s in config.layouts]
     same_map = base.seed if base.layout is None else base.layout
-    found += [Setting("draw", f"#{s}", s, replace(base, seed=s, layout=same_map)) for s in config.draws]
+    found += [StudySetting("draw", f"#{s}", s, replace(base, seed=s, layout=same_map)) for s in config.draws]
     return found
 
 

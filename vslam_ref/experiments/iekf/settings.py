@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Study, Verdict
 from vslam_ref.experiments.iekf.figures import study_arrays
-from vslam_ref.experiments.iekf.grid import BASELINE, SensitivityConfig, Setting, settings_of
+from vslam_ref.experiments.iekf.grid import BASELINE, SensitivityConfig, StudySetting, settings_of
 from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.sentences import SENTENCES, claim_ids
 from vslam_ref.experiments.iekf.study import StudyConfig, run_study
@@ -21,7 +21,7 @@ from vslam_ref.experiments.iekf.verdicts import judge
 class Judged(NamedTuple):
     """A setting with its verdicts: claims by id; NEES of each run, averaged over 150-160 s, by filter/p0."""
 
-    setting: Setting
+    setting: StudySetting
     claims: dict[str, Claim]
     end: dict[str, Array]
 
@@ -66,7 +66,7 @@ def keys(study: StudyConfig) -> list[str]:
     return [f"{name}/{p0}" for name in study.filters for p0 in ("low", "high")]
 
 
-def simulate(config: SensitivityConfig, setting: Setting, unit: None) -> Verdicts:
+def simulate(config: SensitivityConfig, setting: StudySetting, unit: None) -> Verdicts:
     """Run a setting's study and its own consistent control, and judge all statements of B 4.1.
 
     The per-run curves of a setting, some 80 MB, stay in the process that made them.  Each figure draws
@@ -93,7 +93,7 @@ def grid_of(study: Study[dict[str, Verdicts]]) -> Grid:
     return Grid(tuple(_judged(s, study.data[s.name]) for s in settings_of(study.config)))
 
 
-def _judged(setting: Setting, found: Verdicts) -> Judged:
+def _judged(setting: StudySetting, found: Verdicts) -> Judged:
     claims = {}
     for s, v, share, null in zip(SENTENCES.values(), *(c[0].tolist() for c in found[:3]), strict=True):
         null, share = (None if np.isnan(x) else float(x) for x in (null, share))

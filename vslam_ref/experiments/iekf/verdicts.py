@@ -28,7 +28,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, judged
-from vslam_ref.experiments.iekf.evaluation import Evaluation, evaluate_all
+from vslam_ref.experiments.iekf.evaluation import ClaimEvaluation, evaluate_all
 from vslam_ref.experiments.iekf.measures import StudyClock
 from vslam_ref.experiments.iekf.rules import Rule
 from vslam_ref.experiments.iekf.sentences import SENTENCES, Sentence
@@ -91,7 +91,7 @@ def judge(study: StudyArrays, claim_ids: Sequence[str], rng: np.random.Generator
     return [conclude(done[i]) if i in done else _not_testable(SENTENCES[i], reasons[i]) for i in claim_ids]
 
 
-def evaluate(study: StudyArrays, claim_ids: Sequence[str], rng: np.random.Generator) -> list[Evaluation]:
+def evaluate(study: StudyArrays, claim_ids: Sequence[str], rng: np.random.Generator) -> list[ClaimEvaluation]:
     """Return what :func:`judge` concludes from, for the claims that can be tested; same draws."""
     reasons = _obstacles(study, claim_ids)
     sentences = [SENTENCES[i] for i in claim_ids if i not in reasons]
@@ -103,7 +103,7 @@ def evaluate(study: StudyArrays, claim_ids: Sequence[str], rng: np.random.Genera
     return evaluate_all(sentences, data, control, clock, rng)
 
 
-def conclude(e: Evaluation) -> Claim:
+def conclude(e: ClaimEvaluation) -> Claim:
     """Turn an evaluation into a claim with its verdict."""
     rule, s = e.sentence.rule, e.sentence
     conditions = {
@@ -138,7 +138,7 @@ def conclude(e: Evaluation) -> Claim:
     )  # fmt: skip
 
 
-def _found(e: Evaluation, conditions: Mapping[str, bool]) -> str:
+def _found(e: ClaimEvaluation, conditions: Mapping[str, bool]) -> str:
     """Say what was found: the statistic of all runs, its bound, how many studies show it, and the rest."""
     rule = e.sentence.rule
     size = "B's size" if e.study_runs == LEAST_STUDY else f"{e.study_runs} runs"
@@ -155,7 +155,7 @@ def _found(e: Evaluation, conditions: Mapping[str, bool]) -> str:
     return text
 
 
-def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:
+def _why_not(e: ClaimEvaluation, conditions: Mapping[str, bool]) -> str:
     """Say why a claim is not reproduced: not true of the filters, not seen by a study, or not telling."""
     low, high = e.interval
     side = ">" if e.sentence.rule.above else "<="
@@ -168,7 +168,7 @@ def _why_not(e: Evaluation, conditions: Mapping[str, bool]) -> str:
     return "; ".join(text for name, text in reasons.items() if not conditions[name])
 
 
-def all_at_once(evaluations: Sequence[Evaluation]) -> dict[str, float]:
+def all_at_once(evaluations: Sequence[ClaimEvaluation]) -> dict[str, float]:
     """Share of drawn studies in which every one of the claims holds, by the rules and read naively.
 
     A claim without a naive reading counts by its rule in both.

@@ -179,7 +179,7 @@ def _resection(found: Reconstruction) -> Claim:
         f"every picture: turn < {TURN:g} degrees, centre < {1e3 * SHIFT:g} mm, inlier RMSE < {PIXEL:g} px, "
         "inliers > 50 %, iterations > 0",
         _on_pictures(found, len(good) > 0 and bool(good.all())),
-        f"{good.sum()} of {len(good)} cameras are found again; the worst is off by {worst['turn']:.2f} "
+        f"Of {len(good)} cameras {good.sum()} are found again; the worst is off by {worst['turn']:.2f} "
         "degrees, "
         f"{1e3 * worst['shift']:.1f} mm and {worst['rmse_px']:.2f} px{_where(found)}",
         worst | filed | {"iterations": int(sum(r.robust.iterations for r in found.resected))},

@@ -43,7 +43,7 @@ class TukeyConfig:
             raise ValueError(f"starts={self.starts}: must hold 0 and the judged distance {FAR}")
 
 
-class Scene(NamedTuple):
+class SightedLandmarks(NamedTuple):
     """Landmarks (n, 2) in the vehicle's true frame, what was seen of them, honest errors alone; in sigma."""
 
     landmarks: Array
@@ -79,7 +79,7 @@ def losses() -> dict[str, Loss]:
     return dict(zip(COSTS, (TukeyAsPrinted(tukey.c), tukey, tuned("huber", 2), tuned("l2", 2)), strict=True))
 
 
-def make_scene(config: TukeyConfig, rng: np.random.Generator) -> Scene:
+def make_scene(config: TukeyConfig, rng: np.random.Generator) -> SightedLandmarks:
     """Draw landmarks and sightings."""
     n = config.landmarks
     landmarks = rng.uniform(-config.radius, config.radius, (n, 2)) / config.sigma
@@ -88,20 +88,20 @@ def make_scene(config: TukeyConfig, rng: np.random.Generator) -> Scene:
     size = rng.uniform(config.wrong_least, config.wrong_most, n)
     wrong = np.arange(n) < round(config.wrong * n)
     push = (wrong * size)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return Scene(landmarks, landmarks + noise + push, landmarks + noise)
+    return SightedLandmarks(landmarks, landmarks + noise + push, landmarks + noise)
 
 
-def displaced(scene: Scene, x: Array, reach: float) -> Array:
+def displaced(scene: SightedLandmarks, x: Array, reach: float) -> Array:
     """Landmarks moved by a pose x = (dx, dy, turn times ``reach``); all three numbers are in sigma."""
     return se2.act(np.array([x[0], x[1], x[2] / reach]), scene.landmarks)
 
 
-def objective(scene: Scene, loss: Loss, x: Array, reach: float) -> float:
+def objective(scene: SightedLandmarks, loss: Loss, x: Array, reach: float) -> float:
     """Sum of the costs of all sightings' error norms."""
     return float(loss.cost(np.linalg.norm(displaced(scene, x, reach) - scene.seen, axis=1)).sum())
 
 
-def descend(scene: Scene, seen: Array, loss: Loss, start: Array, reach: float) -> Array:
+def descend(scene: SightedLandmarks, seen: Array, loss: Loss, start: Array, reach: float) -> Array:
     """Minimise the sum of costs of the errors' norms, downhill from the start."""
     from scipy.optimize import minimize
 
@@ -113,7 +113,7 @@ def descend(scene: Scene, seen: Array, loss: Loss, start: Array, reach: float) -
     return np.asarray(minimize(total, start, method="Nelder-Mead", options=settings).x)
 
 
-def reweight(scene: Scene, seen: Array, loss: Loss, as_printed: bool, reach: float) -> Array:
+def reweight(scene: SightedLandmarks, seen: Array, loss: Loss, as_printed: bool, reach: float) -> Array:
     """Gauss-Newton on reweighted residuals; the rows' factor is the root of w, or A2.8 over the norm."""
     x = np.zeros(3)
     for _ in range(50):

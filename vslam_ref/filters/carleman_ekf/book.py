@@ -52,51 +52,44 @@ def control(ds: float, dalpha: float, Q: Array) -> tuple[Array, Array]:
     return U, G_U @ Q @ G_U.T  # eq-noise-first-order
 
 
-def columns(rows: object, size: int) -> Array:
-    """Matrix (size, size) of a linear function of ``size`` states: what it does to each unit vector."""
-    return np.stack([rows(e) for e in np.eye(size)], 1)  # type: ignore[operator]
-
-
 def vehicle_rows(z: Array, U: Array) -> Array:
-    """The eleven vehicle states after the control U (3,); linear in z (11,)."""
+    """The eleven vehicle states after the control U (3,), linear in z (11,); of the unit vectors, M_R."""
     u1, u2, u3 = U
     z1, z2, z3, z4, z5, z6, z7, z8, z9, z10, z11 = z
-    return np.array(
-        [
-            z1 + u1 * z4,  # eq-b16; its first four rows: eq-b7, eq-b8, eq-b9
-            z2 + u1 * z3,
-            z3 * u3 + z4 * u2,
-            z4 * u3 - z3 * u2,
-            z5 * u3 * u3 + 2 * z11 * u2 * u3 + z6 * u2 * u2,
-            z6 * u3 * u3 - 2 * z11 * u2 * u3 + z5 * u2 * u2,
-            z7 * u3 + z8 * u2 + z6 * u1 * u2 + z11 * u1 * u3,
-            z8 * u3 - z7 * u2 + z6 * u1 * u3 - z11 * u1 * u2,
-            z9 * u3 + z10 * u2 + z5 * u1 * u3 + z11 * u1 * u2,
-            z10 * u3 - z9 * u2 + z11 * u1 * u3 - z5 * u1 * u2,
-            z11 * u3 * u3 - z5 * u2 * u3 + z6 * u2 * u3 - z11 * u2 * u2,
-        ]
-    )
+    rows = [
+        z1 + u1 * z4,  # eq-b16; its first four rows: eq-b7, eq-b8, eq-b9
+        z2 + u1 * z3,
+        z3 * u3 + z4 * u2,
+        z4 * u3 - z3 * u2,
+        z5 * u3 * u3 + 2 * z11 * u2 * u3 + z6 * u2 * u2,
+        z6 * u3 * u3 - 2 * z11 * u2 * u3 + z5 * u2 * u2,
+        z7 * u3 + z8 * u2 + z6 * u1 * u2 + z11 * u1 * u3,
+        z8 * u3 - z7 * u2 + z6 * u1 * u3 - z11 * u1 * u2,
+        z9 * u3 + z10 * u2 + z5 * u1 * u3 + z11 * u1 * u2,
+        z10 * u3 - z9 * u2 + z11 * u1 * u3 - z5 * u1 * u2,
+        z11 * u3 * u3 - z5 * u2 * u3 + z6 * u2 * u3 - z11 * u2 * u2,
+    ]
+    return np.array(rows)
 
 
 def vehicle_noise(z: Array, U: Array) -> Array:
     """J_U (11, 3): the derivative of the eleven rows of z (11,) in U (3,)."""
     u1, u2, u3 = U
     _, _, z3, z4, z5, z6, z7, z8, z9, z10, z11 = z
-    return np.array(
-        [
-            [z4, 0, 0],  # eq-jacobian-control-vehicle; its first four rows: eq-b11
-            [z3, 0, 0],
-            [0, z4, z3],
-            [0, -z3, z4],
-            [0, 2 * z11 * u3 + 2 * z6 * u2, 2 * z5 * u3 + 2 * z11 * u2],
-            [0, -2 * z11 * u3 + 2 * z5 * u2, 2 * z6 * u3 - 2 * z11 * u2],
-            [z6 * u2 + z11 * u3, z8 + z6 * u1, z7 + z11 * u1],
-            [z6 * u3 - z11 * u2, -z7 - z11 * u1, z8 + z6 * u1],
-            [z5 * u3 + z11 * u2, z10 + z11 * u1, z9 + z5 * u1],
-            [z11 * u3 - z5 * u2, -z9 - z5 * u1, z10 + z11 * u1],
-            [0, (z6 - z5) * u3 - 2 * z11 * u2, 2 * z11 * u3 + (z6 - z5) * u2],
-        ]
-    )
+    rows = [
+        [z4, 0, 0],  # eq-jacobian-control-vehicle; its first four rows: eq-b11
+        [z3, 0, 0],
+        [0, z4, z3],
+        [0, -z3, z4],
+        [0, 2 * z11 * u3 + 2 * z6 * u2, 2 * z5 * u3 + 2 * z11 * u2],
+        [0, -2 * z11 * u3 + 2 * z5 * u2, 2 * z6 * u3 - 2 * z11 * u2],
+        [z6 * u2 + z11 * u3, z8 + z6 * u1, z7 + z11 * u1],
+        [z6 * u3 - z11 * u2, -z7 - z11 * u1, z8 + z6 * u1],
+        [z5 * u3 + z11 * u2, z10 + z11 * u1, z9 + z5 * u1],
+        [z11 * u3 - z5 * u2, -z9 - z5 * u1, z10 + z11 * u1],
+        [0, (z6 - z5) * u3 - 2 * z11 * u2, 2 * z11 * u3 + (z6 - z5) * u2],
+    ]
+    return np.array(rows)
 
 
 def predict_lifted(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
@@ -104,7 +97,7 @@ def predict_lifted(b: Belief, ds: float, dalpha: float, Q: Array) -> Belief:
     U, Q_U = control(ds, dalpha, Q)
     turn = np.array([[U[2], U[1]], [-U[1], U[2]]])
     M_L = block_diag(np.eye(2), turn, turn)  # eq-b18
-    M = block_diag(columns(lambda z: vehicle_rows(z, U), 11), *[M_L] * len(b.ids))
+    M = block_diag(vehicle_rows(np.eye(11), U), *[M_L] * len(b.ids))
     J = [vehicle_noise(b.Z[:11], U)]
     for _, _, z3, z4, z5, z6 in b.Z[11:].reshape(-1, 6):
         J.append(np.array([[0, 0, 0], [0, 0, 0], [0, z4, z3], [0, -z3, z4], [0, z6, z5], [0, -z5, z6]]))

@@ -25,6 +25,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.geometry import so2
 
 NONE, AMBIGUOUS = -1, -2
+SMOOTH, WINDOW = 0.8, 2.0  # of a corner of S: sigma of its gradients, and of the cells that take part
 
 
 class Corner(NamedTuple):
@@ -61,15 +62,13 @@ def gaussian(offset: Array, sigma: float) -> Array:
     return np.where(np.abs(offset) <= reach[-1], w, 0.0)
 
 
-def corner_of_map(
-    P_S: Array, row: int, column: int, smooth: float = 0.8, window: float = 2.0
-) -> tuple[Array, float]:
+def corner_of_map(P_S: Array, row: int, column: int) -> tuple[Array, float]:
     """Corner (x, y) of S near a cell, in cells from the middle of the first one, and its strength."""
     i, j = (np.arange(float(n)) for n in P_S.shape)
     q = np.maximum(2 * P_S - 1, 0)
-    q = gaussian(i[:, None] - i, smooth) @ q @ gaussian(j[:, None] - j, smooth)
+    q = gaussian(i[:, None] - i, SMOOTH) @ q @ gaussian(j[:, None] - j, SMOOTH)
     g_y, g_x = list[Array](np.gradient(q))
-    w: Array = np.outer(gaussian(i - row, window), gaussian(j - column, window))
+    w: Array = np.outer(gaussian(i - row, WINDOW), gaussian(j - column, WINDOW))
     M, Mx = np.zeros((2, 2)), np.zeros(2)
     for r, c in np.argwhere(w > 0):
         g = np.array([g_x[r, c], g_y[r, c]])
@@ -125,17 +124,14 @@ def update(x: Array, P: Array, H: Array, innovation: Array, cov: Array) -> tuple
     return x, (np.eye(len(x)) - K @ H) @ P
 
 
-def localise(
-    x: Array, P: Array, corners: list[Corner], marks: list[Corner]
-) -> tuple[Array, Array, list[int]]:
-    """Update x (D,), P (D, D) with all corners that belong to a landmark, linearised at one x."""
-    which = associate(x, P, corners, marks)
+def localise(x: Array, P: Array, corners: list[Corner], which: list[int]) -> tuple[Array, Array]:
+    """Update x (D,), P (D, D) with the corners that belong to a landmark, linearised at one x."""
     seen = [(z, *observe(x, j)) for z, j in zip(corners, which, strict=True) if j >= 0]
     if not seen:
-        return x, P, which
+        return x, P
     H = np.concatenate([H for _, _, H in seen])
     innovation = np.concatenate([z.xy - h for z, h, _ in seen])
-    return *update(x, P, H, innovation, block_diag(*(z.cov for z, _, _ in seen))), which
+    return update(x, P, H, innovation, block_diag(*(z.cov for z, _, _ in seen)))
 
 
 class Floor:
@@ -168,13 +164,13 @@ def match(
 
     def cost(p: Array) -> float:
         off = p - p_bar
-        rho = [cut**2 / 6 * (1 - max(1 - (r / cut) ** 2, 0) ** 3) for r, _ in residuals(p, points, floor)]
+        rho = [cut**2 / 6 * (1 - max(1 - (residual(p, x, floor)[0] / cut) ** 2, 0) ** 3) for x in points]
         return float(sum(rho) / sigma**2 + 0.5 * off @ np.linalg.inv(P_bar) @ off)  # eq-field-map
 
     p, A = p_bar, np.zeros((3, 3))
     for _ in range(20):
         A, g = np.zeros((3, 3)), np.linalg.inv(P_bar) @ (p - p_bar)
-        for r, J in residuals(p, points, floor):
+        for r, J in (residual(p, x, floor) for x in points):
             w = max(1 - (r / cut) ** 2, 0) ** 2 / sigma**2
             A, g = A + w * np.outer(J, J), g + w * r * J
         step = -np.linalg.solve(A + np.linalg.inv(P_bar), g)
@@ -185,15 +181,11 @@ def match(
     return p, A
 
 
-def residuals(p: Array, points: Array, floor: Floor) -> list[tuple[float, Array]]:
-    """Distance from what is static, and its Jacobian (3,) in the pose p (3,), of each of points (n, 2)."""
-    found = []
-    for x in points:
-        lever = so2.exp(p[2]) @ x
-        r, D = floor.at(lever + p[:2])
-        J = np.array([D[0], D[1], D[1] * lever[0] - D[0] * lever[1]])  # eq-field-residual
-        found.append((r, J))
-    return found
+def residual(p: Array, x: Array, floor: Floor) -> tuple[float, Array]:
+    """Distance of a scan's point x (2,) from what is static, and its Jacobian (3,) in the pose p (3,)."""
+    lever = so2.exp(p[2]) @ x
+    r, D = floor.at(lever + p[:2])
+    return r, np.array([D[0], D[1], D[1] * lever[0] - D[0] * lever[1]])  # eq-field-residual
 
 
 def use_match(x: Array, P: Array, p: Array, A: Array) -> tuple[Array, Array]:
