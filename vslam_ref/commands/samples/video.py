@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.commands.options import warm
 from vslam_ref.commands.samples import Made
 from vslam_ref.datasets import trajectories
 from vslam_ref.datasets.pictures import write_png
@@ -30,6 +31,7 @@ true:   groundtruth_tum.txt, poses of the camera in the world, lines 'time tx ty
 
 def make(folder: Path, rng: np.random.Generator) -> Made:
     """Render the pictures and write them beside what is true."""
+    warm("features", "rendered")
     seed = int(rng.integers(2**31))
     camera = rendered.pinhole("desk", SIZE)
     scene = rendered.scene("desk", seed, camera=camera, size=SIZE, frames=PICTURES)
