@@ -6,7 +6,7 @@ module                  holds
 ``book``                the algorithms for one pair of pictures, to be read
 ``eight_point``         ``linear_essential``, ``linear_fundamental``, ``nearest_essential``
 ``five_point``          ``five_point_essentials``: all essential matrices of many samples of five
-``homography``          ``fit_homography``, ``apply_homography``
+``homography``          ``fit_homography``, ``apply_homography``, ``plane_homography``
 ``decompose``           ``essential_motions`` (four), ``homography_motions`` (two, with normals)
 ``sampson``             signed distances: ``sampson``, ``sampson_with_jacobians`` of a relative pose and its
                         five numbers, ``perturb``, ``essential_sampson``, ``homography_sampson``
@@ -63,7 +63,11 @@ from vslam_ref.geometry.multiview.two_views.eight_point import (
     nearest_essential,
 )
 from vslam_ref.geometry.multiview.two_views.five_point import FivePointEssentials, five_point_essentials
-from vslam_ref.geometry.multiview.two_views.homography import apply_homography, fit_homography
+from vslam_ref.geometry.multiview.two_views.homography import (
+    apply_homography,
+    fit_homography,
+    plane_homography,
+)
 from vslam_ref.geometry.multiview.two_views.sampson import (
     SampsonJacobians,
     essential_sampson,
@@ -104,6 +108,7 @@ __all__ = [
     "linear_fundamental",
     "nearest_essential",
     "perturb",
+    "plane_homography",
     "sampson",
     "sampson_with_jacobians",
     "torr_criterion",
