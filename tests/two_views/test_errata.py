@@ -9,7 +9,7 @@ from vslam_ref.geometry.multiview.two_views import apart
 
 
 def test_a_wrong_focal_length_fits_five_points_exactly(pair) -> None:
-    """With 500 and with 700 pixels five pairs of pixels fit to rounding, by two different motions in front."""
+    """With 500 and with 700 pixels five pairs of pixels fit to rounding, by two motions in front."""
     both = 0
     for seed in range(20):
         s = pair(np.random.default_rng(seed), 5)

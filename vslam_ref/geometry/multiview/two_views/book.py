@@ -9,7 +9,8 @@
     H                     two motions, two planes         sometimes one is possible
     wrong pairs           samples                         the cheapest model wins
 
-Positions are normalised and homogeneous, rows x (N, 3) = (x, y, 1); translations have length 1.  The fast forms do the same for many samples at once; a test asserts that they agree.
+Positions are normalised and homogeneous, rows x (N, 3) = (x, y, 1); translations have length 1.  The fast
+forms do the same for many samples at once; a test asserts that they agree.
 """
 
 from __future__ import annotations
