@@ -1,4 +1,4 @@
-"""Exercise 9.1: the nearest essential matrix, four motions, the cost of a pair, and a motion from bad pairs."""
+"""Exercise 9.1: the nearest essential matrix, four motions, the cost of a pair, a motion from bad pairs."""
 
 from __future__ import annotations
 
@@ -92,11 +92,11 @@ def test_far_points_cost_their_noise(answer: ModuleType) -> None:
 
 def test_the_motion_is_found_though_a_fifth_of_the_pairs_is_wrong(answer: ModuleType, pair) -> None:
     for seed in range(3):
-        s = pair(np.random.default_rng(seed), 60, sigma_px=0.3, wrong=0.2)
-        R, t = answer.find_motion(lifted(s.a), lifted(s.b), 0.3 / 500, np.random.default_rng(seed))
+        s = pair(np.random.default_rng(seed), 60, sigma_px=0.1, wrong=0.2)
+        R, t = answer.find_motion(lifted(s.a), lifted(s.b), 0.2 / 500, np.random.default_rng(seed))
         turn = np.linalg.norm(so3.log(np.asarray(R) @ s.T_b_a[:3, :3].T))
         direction = np.arccos(np.clip(np.asarray(t) @ s.T_b_a[:3, 3], -1, 1))
         if direction > np.pi / 2:
             pytest.fail("the direction is mirrored: which of the four motions has the points in front?")
-        # eight-point on 48 pairs with 0.3 px of noise, seen at 500 px: a few degrees
+        # eight-point on 48 pairs with 0.1 px of noise at 500 px: 2e-4 times a condition of some 100
         assert np.degrees([turn, direction]).max() < 5

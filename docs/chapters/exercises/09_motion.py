@@ -1,7 +1,7 @@
-"""Exercise 9.1: which way did it go?
+"""Exercise 9.1: find the motion.
 
-Positions are normalised and homogeneous: rows x = (x, y, 1).  A motion is a rotation R (3, 3) and a translation
-t (3,) of length 1 from camera a to camera b, X_b = R X_a + t; E = hat(t) R, and x_b^T E x_a = 0.
+Positions are normalised and homogeneous: rows x = (x, y, 1).  A motion is a rotation R (3, 3) and a
+translation t (3,) of length 1 from camera a to camera b, X_b = R X_a + t; E = hat(t) R, and x_b^T E x_a = 0.
 """
 
 import numpy as np
@@ -52,7 +52,7 @@ def find_motion(
     Returns
     -------
     (ndarray of shape (3, 3), ndarray of shape (3,))
-        Within a few degrees of the truth: take samples of eight pairs, the mean of min(cost / sigma^2, 4) as
-        their judge, and fit the best one again to all its pairs.
+        Within a few degrees of the truth: take samples of eight pairs, judge each by the mean of
+        min(distance^2 / sigma^2, 4) over all pairs, and fit the best one again to all its pairs.
     """
     raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Exercise 9.1: which way did it go?"""
+"""Exercise 9.1: find the motion."""
 
 import numpy as np
 
@@ -35,22 +35,29 @@ def cost(R: np.ndarray, t: np.ndarray, x_a: np.ndarray, x_b: np.ndarray) -> floa
 def find_motion(
     x_a: np.ndarray, x_b: np.ndarray, sigma: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Samples of eight pairs; the cheapest motion, fitted again to what fits it."""
+    """Samples of eight pairs, judged by their lines; a fit to what fits; the motion that is in front."""
 
-    def price(R: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return np.array([cost(R, t, a, b) for a, b in zip(x_a, x_b, strict=True)]) / sigma**2
+    def fitted(rows: np.ndarray) -> np.ndarray:
+        A = np.einsum("ni,nj->nij", x_b[rows], x_a[rows]).reshape(-1, 9)
+        return nearest_essential(np.linalg.svd(A)[2][-1].reshape(3, 3))
 
-    def best_of(rows: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        A = np.array([np.kron(x_b[k], x_a[k]) for k in rows])
-        E = nearest_essential(np.linalg.svd(A)[2][-1].reshape(3, 3))
-        tried = [(np.minimum(price(R, t), 4.0).mean(), R, t) for R, t in motions(E)]
-        return min(tried, key=lambda one: one[0])
+    def distances(E: np.ndarray) -> np.ndarray:
+        line_b, line_a = x_a @ E.T, x_b @ E
+        gradient = np.sum(line_b[:, :2] ** 2 + line_a[:, :2] ** 2, axis=1)
+        return np.sum(x_b * line_b, axis=1) ** 2 / gradient / sigma**2
 
-    best = min((best_of(rng.choice(len(x_a), 8, replace=False)) for _ in range(60)), key=lambda one: one[0])
-    for _ in range(3):
-        fits = np.flatnonzero(price(*best[1:]) < 9.0)
-        if len(fits) < 8:
-            break
-        again = best_of(fits)
-        best = min(best, again, key=lambda one: one[0])
-    return best[1], best[2]
+    def judged(E: np.ndarray) -> float:
+        return float(np.minimum(distances(E), 4.0).mean())
+
+    samples = [fitted(rng.choice(len(x_a), 8, replace=False)) for _ in range(300)]
+    best = min(samples, key=judged)
+    for _ in range(5):
+        fits = np.flatnonzero(distances(best) < 9.0)
+        if len(fits) >= 8:
+            best = min(best, fitted(fits), key=judged)
+
+    def price(motion: tuple[np.ndarray, np.ndarray]) -> float:
+        costs = [cost(*motion, a, b) / sigma**2 for a, b in zip(x_a, x_b, strict=True)]
+        return float(np.minimum(costs, 4.0).mean())
+
+    return min(motions(best), key=price)

@@ -73,6 +73,9 @@ def plus(*terms: tuple[float, Polynomial]) -> Polynomial:
     return dict(total)
 
 
+# from five pairs to matrices
+
+
 def five_point(x_a: Array, x_b: Array) -> list[Array]:
     """All real E (3, 3), of norm sqrt(2), that fit five pairs ``x (5, 3)``, normalised."""
     X, Y, Z, W = np.linalg.svd(rows(x_a, x_b))[2][5:].reshape(4, 3, 3)  # eq-null-space
@@ -106,6 +109,9 @@ def five_point(x_a: Array, x_b: Array) -> list[Array]:
     return found
 
 
+# from the matrix to the motion
+
+
 def motions(E: Array) -> list[tuple[Array, Array]]:
     """Four pairs R_b_a (3, 3) and t_b_a (3,) of ``E (3, 3)``; t has length 1."""
     U, _, Vt = np.linalg.svd(E)
@@ -115,7 +121,10 @@ def motions(E: Array) -> list[tuple[Array, Array]]:
 
 
 def cost(R: Array, t: Array, x_a: Array, x_b: Array) -> float:
-    """Squared distance of one pair ``x (3,)`` from a point in front; normalised positions, |t| = 1."""
+    """Squared distance of one pair ``x_a (3,)``, ``x_b (3,)`` from a point in front; normalised positions.
+
+    ``R (3, 3)``, ``t (3,)`` of length 1.
+    """
     a, b = R @ x_a, x_b
     n = np.cross(a, b)
     E = np.cross(np.eye(3), t).T @ R  # hat(t) R, a column at a time

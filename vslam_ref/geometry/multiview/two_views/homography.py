@@ -93,7 +93,7 @@ def plane_homography(T_b_a: ArrayLike, normal: ArrayLike, distance: ArrayLike) -
 
 
 def apply_homography(H: ArrayLike, x: ArrayLike) -> Array:
-    """Images (..., N, 2) of points ``x (..., N, 2)`` under ``H (..., 3, 3)``; the unit is that of H.
+    """Images (..., N, 2) of points ``x (..., N, 2)`` under ``H (..., 3, 3)``; normalised, or in pixels.
 
     Implements :eq:`eq-plane-homography`.  On the line that H sends to infinity the answer is infinite.
     """
