@@ -6,6 +6,7 @@ cofactors, answers of a homography from a search over normals: not the generator
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -33,8 +34,15 @@ def _signed(E: Array, size: float) -> Array:
 
 
 def essential_of_pairs(xn_a: Array, xn_b: Array, wrong: str | None = None) -> Array:
+    E = _searched(xn_a.tobytes(), xn_b.tobytes())
+    return _signed(E.T if wrong == "transposed" else E, math.sqrt(2))
+
+
+@functools.cache
+def _searched(bytes_a: bytes, bytes_b: bytes) -> Array:
     """Rotation and direction by least squares from many starts, until nothing is left."""
-    a, b, rng = _lift(xn_a), _lift(xn_b), np.random.default_rng(0)
+    a, b = (_lift(np.frombuffer(x).reshape(-1, 2)) for x in (bytes_a, bytes_b))
+    rng = np.random.default_rng(0)
 
     def left(x: Array) -> Array:
         E = skew(x[3:] / np.linalg.norm(x[3:])) @ Rotation.from_rotvec(x[:3]).as_matrix()
@@ -46,8 +54,7 @@ def essential_of_pairs(xn_a: Array, xn_b: Array, wrong: str | None = None) -> Ar
         if found.cost < 1e-24:
             break
     t = found.x[3:] / np.linalg.norm(found.x[3:])
-    E = skew(t) @ Rotation.from_rotvec(found.x[:3]).as_matrix()
-    return _signed(E.T if wrong == "transposed" else E, math.sqrt(2))
+    return skew(t) @ Rotation.from_rotvec(found.x[:3]).as_matrix()
 
 
 def homography(x_a: Array, x_b: Array, wrong: str | None = None) -> Array:
@@ -124,30 +131,39 @@ def depths(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | None = None) -> 
 
 
 def motion_from_homography(H: Array, xn_a: Array, wrong: str | None = None) -> Array:
-    """Normals for which H - t n^T is a rotation, by least squares from many starts."""
-    s = np.linalg.svd(H, compute_uv=False)
-    H, rng = H / s[1] * np.sign(np.linalg.det(H)), np.random.default_rng(1)
-    answers: list[Any] = []
-    for _ in range(60):
-
-        def left(x: Array) -> Array:
-            R = H - np.outer(x[3:], x[:3] / np.linalg.norm(x[:3]))
-            return (R @ R.T - np.eye(3))[np.triu_indices(3)]
-
-        found = least_squares(left, rng.normal(size=6), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        n, t = found.x[:3] / np.linalg.norm(found.x[:3]), found.x[3:]
-        if found.cost > 1e-22 or np.linalg.det(H - np.outer(t, n)) < 0:
-            continue
-        side = np.sign(np.sum(np.sign(_lift(xn_a) @ n)))
-        n, t = (n, t) if side >= 0 else (-n, -t)
-        if all(np.abs(n - m).max() > 1e-4 for m, _ in answers):
-            answers.append((n, t))
+    H = H / np.linalg.svd(H, compute_uv=False)[1] * np.sign(np.linalg.det(H))
+    answers = []
+    for n, t in _normals(H.tobytes()):
+        side = 1.0 if np.sum(np.sign(_lift(xn_a) @ n)) >= 0 else -1.0
+        answers.append((side * n, side * t))
     good = [(n, t) for n, t in answers if (_lift(xn_a) @ n > 0).all()]
     if len(good) != 1:
         raise ValueError("both answers are possible")
     n, t = next(a for a in answers if a[0] is not good[0][0]) if wrong == "twin-accepted" else good[0]
     T = _rigid(H - np.outer(t, n), t)
     return np.linalg.inv(T) if wrong == "other-way-round" else T
+
+
+@functools.cache
+def _normals(bytes_H: bytes) -> list[tuple[Array, Array]]:
+    """Normals for which H - t n^T is a rotation, by least squares from many starts; one of n, -n."""
+    H, rng = np.frombuffer(bytes_H).reshape(3, 3), np.random.default_rng(1)
+
+    def left(x: Array) -> Array:
+        R = H - np.outer(x[3:], x[:3] / np.linalg.norm(x[:3]))
+        return (R @ R.T - np.eye(3))[np.triu_indices(3)]
+
+    answers: list[tuple[Array, Array]] = []
+    for _ in range(60):
+        found = least_squares(left, rng.normal(size=6), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        n, t = found.x[:3] / np.linalg.norm(found.x[:3]), found.x[3:]
+        if found.cost > 1e-22 or np.linalg.det(H - np.outer(t, n)) < 0:
+            continue
+        if all(min(np.abs(n - m).max(), np.abs(n + m).max()) > 1e-4 for m, _ in answers):
+            answers.append((n, t))
+        if len(answers) == 2:
+            break
+    return answers
 
 
 def _map(H: Array, x: Array) -> Array:

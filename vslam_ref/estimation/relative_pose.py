@@ -178,7 +178,9 @@ def estimate_motion(
 ) -> MotionEstimate:
     """Motion between two pictures from pairs of which many may be wrong, or the reason why there is none.
 
-    Implements :eq:`eq-choice` on the motions of both models, each refined by :eq:`eq-motion-refined`.
+    Implements A§2.2.2, the start from two frames: :eq:`eq-choice` on the motions of both models, each
+    refined by
+    :eq:`eq-motion-refined`.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ def _camera(axes: Axes, p: NDArray[np.float64], axis: NDArray[np.float64], colou
     wedge = np.array([base, base + 0.7 * ahead + 0.35 * side, base + 0.7 * ahead - 0.35 * side, base])
     axes.plot(*wedge.T, color=colour, lw=1.5)
     axes.plot(*base, "o", color=colour, ms=5)
-    axes.annotate(name, base, textcoords="offset points", xytext=(6, -10), color=colour)
+    axes.annotate(name, (base[0], base[1]), textcoords="offset points", xytext=(6, -10), color=colour)
 
 
 def draws_figure(sizes: Mapping[str, int], confidence: float, needed: ArrayLike, share: ArrayLike) -> Figure:

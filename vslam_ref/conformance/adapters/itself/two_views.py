@@ -15,7 +15,8 @@ Array = NDArray[Any]
 
 def _signed(E: Array) -> Array:
     """The one of both signs whose entry of largest size is positive."""
-    return E * np.sign(E.flat[np.argmax(np.abs(E))])
+    signed: Array = E * np.sign(E.flat[np.argmax(np.abs(E))])
+    return signed
 
 
 def _five(xn_a: Array, xn_b: Array) -> Array:
