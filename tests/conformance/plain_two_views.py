@@ -203,6 +203,16 @@ def sampson_turn_jacobian(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | N
     return np.array(slopes)
 
 
+def sampson_direction_derivative(
+    T_b_a: Array, xn_a: Array, xn_b: Array, v: Array, wrong: str | None = None
+) -> float:
+    """Complex step."""
+    R, t = T_b_a[:3, :3], T_b_a[:3, 3]
+    e, g = _parts(R, t + 1e-40j * v, xn_a, xn_b)
+    g = _parts(R, t, xn_a, xn_b)[1] if wrong == "numerator-only" else g
+    return float((e / g).imag / 1e-40)
+
+
 def cheirality_cost(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | None = None) -> float:
     R, t = T_b_a[:3, :3], T_b_a[:3, 3]
     if wrong == "side-forgotten" or (_depths(T_b_a, xn_a, xn_b) > 0).all():
@@ -244,6 +254,7 @@ PROGRAM = {
     "two_views.motion_from_homography": motion_from_homography,
     "two_views.homography_distance": homography_distance,
     "two_views.sampson_turn_jacobian": sampson_turn_jacobian,
+    "two_views.sampson_direction_derivative": sampson_direction_derivative,
     "two_views.depths": depths,
     "two_views.cheirality_cost": cheirality_cost,
     "two_views.draws": draws,

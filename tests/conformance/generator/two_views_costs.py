@@ -42,6 +42,10 @@ def cost_groups(topic: Topic, rng: np.random.Generator) -> None:
     topic.group(
         "two_views.model_criterion", "eq-gric", oracle, few, [_gric(rng, 2 + k % 2) for k in range(8)]
     )
+    few = tolerance(1e-12, "some dozen operations, a length of the gradient above 0.1")
+    cases = [_direction_slope(rng) for _ in range(10)]
+    oracle = "central differences of the definition, 50 digits"
+    topic.group("two_views.sampson_direction_derivative", "eq-sampson-jacobian", oracle, few, cases)
 
 
 def _case(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
@@ -127,6 +131,26 @@ def _turn_slope(rng: np.random.Generator) -> dict[str, Any]:
     }
     inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist()}
     return _case(inputs, "J_turn", slope(lambda e, g: e / g), wrong)
+
+
+def _direction_slope(rng: np.random.Generator) -> dict[str, Any]:
+    T = _given(*_motion(rng))
+    R, t = matrix(T[:3, :3]), mpmath.matrix(vector(T[:3, 3]))
+    given = digits(np.cross(T[:3, 3], rng.uniform(-1, 1, 3)), 15)
+    v = mpmath.matrix(vector(given))
+    a, b = (digits(rng.uniform(-0.5, 0.5, 2), 6) for _ in range(2))
+    x, y = vector(a), vector(b)
+
+    def slope(part: Any) -> Any:
+        def of(step: list[Any]) -> list[Any]:
+            moved = t + step[0] * v
+            return [part(*_sampson(R, moved / mpmath.norm(moved), x, y))]
+
+        return derivative(of, [mpf(0)])[0]
+
+    wrong = {"numerator-only": slope(lambda e, g: e) / _sampson(R, t, x, y)[1]}
+    inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist(), "v": given.tolist()}
+    return _case(inputs, "slope", slope(lambda e, g: e / g), wrong)
 
 
 def _depths(rng: np.random.Generator) -> dict[str, Any]:

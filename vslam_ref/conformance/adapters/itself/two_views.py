@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.geometry.multiview import fundamental_from_essential, two_views
+from vslam_ref.geometry.multiview._rays import across
 
 Array = NDArray[Any]
 
@@ -50,6 +51,12 @@ def _of_plane(T_b_a: Array, normal: Array, d: float) -> Array:
     return two_views.plane_homography(T_b_a, normal, d)
 
 
+def _direction_slope(T_b_a: Array, xn_a: Array, xn_b: Array, v: Array) -> float:
+    """The two numbers of a direction are those along two vectors across it."""
+    J = two_views.sampson_with_jacobians(T_b_a, xn_a, xn_b).J_motion[0, :2]
+    return float(J @ across(T_b_a[:3, 3]) @ v)
+
+
 TABLE: Answers = {
     "two_views.eight_point": lambda xn_a, xn_b: _signed(two_views.linear_essential(xn_a, xn_b).E),
     "two_views.five_point": _five,
@@ -67,6 +74,7 @@ TABLE: Answers = {
     "two_views.sampson_turn_jacobian": lambda T_b_a, xn_a, xn_b: two_views.sampson_with_jacobians(
         T_b_a, xn_a, xn_b
     ).J_motion[0, 2:],
+    "two_views.sampson_direction_derivative": _direction_slope,
     "two_views.depths": lambda T_b_a, xn_a, xn_b: two_views.depths(T_b_a, xn_a[None], xn_b[None])[0],
     "two_views.cheirality_cost": lambda T_b_a, xn_a, xn_b: float(
         two_views.cheirality(T_b_a, xn_a[None], xn_b[None]).squared[0]
