@@ -191,7 +191,7 @@ def _parts(R: Array, t: Array, a: Array, b: Array) -> tuple[Any, Any]:
     return q @ E @ p, np.sqrt(np.sum(g * g))
 
 
-def sampson_turn_jacobian(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | None = None) -> Array:
+def sampson_turn_jacobian(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | None = None) -> Any:
     """Complex steps."""
     R, t = T_b_a[:3, :3], T_b_a[:3, 3] / np.linalg.norm(T_b_a[:3, 3])
     slopes = []
@@ -200,7 +200,8 @@ def sampson_turn_jacobian(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | N
         turned = R @ step if wrong == "perturbed-from-the-right" else step @ R
         e, g = _parts(turned, t, xn_a, xn_b)
         slopes.append((e / (_parts(R, t, xn_a, xn_b)[1] if wrong == "numerator-only" else g)).imag / 1e-40)
-    return np.array(slopes)
+    e, g = _parts(R, t, xn_a, xn_b)
+    return {"J_turn": np.array(slopes), "value": float(e / g)}
 
 
 def sampson_direction_derivative(
@@ -213,12 +214,12 @@ def sampson_direction_derivative(
     return float((e / g).imag / 1e-40)
 
 
-def cheirality_cost(T_b_a: Array, xn_a: Array, xn_b: Array, wrong: str | None = None) -> float:
+def cheirality_cost(T_b_a: Array, xn_a: Array, xn_b: Array, sigma: float, wrong: str | None = None) -> float:
     R, t = T_b_a[:3, :3], T_b_a[:3, 3]
     if wrong == "side-forgotten" or (_depths(T_b_a, xn_a, xn_b) > 0).all():
         e, g = _parts(R, t / np.linalg.norm(t), xn_a, xn_b)
-        return float((e / g) ** 2)
-    return homography_distance(R, xn_a, xn_b)
+        return float((e / g / sigma) ** 2)
+    return homography_distance(R, xn_a, xn_b) / sigma**2
 
 
 def draws(share: float, size: float, confidence: float, wrong: str | None = None) -> float:

@@ -298,9 +298,10 @@ def _planar(rng: np.random.Generator) -> dict[str, Any] | None:
     if mpmath.mnorm(twin[0] - R, "f") < mpf("0.05"):
         return None
     fronts = [(twin[2].T * mpmath.matrix([*x, 1]))[0] for x in a]
-    if min(abs(v) for v in fronts) < mpf("0.02"):
+    if min(abs(v) for v in fronts) < mpf("0.02") or sum(v > 0 for v in fronts) * 2 == len(fronts):
         return None
-    inputs = {"H": floats(H), "xn_a": floats(a)}
+    factor = float(digits(rng.uniform(0.3, 3.0) * rng.choice([-1, 1]), 3))
+    inputs = {"H": floats(H * mpf(factor)), "xn_a": floats(a)}
     if all(v > 0 for v in fronts) or all(v < 0 for v in fronts):
         return {"inputs": inputs, "expected": {}, "result": "invalid"}
     side = 1 if sum(v > 0 for v in fronts) * 2 > len(fronts) else -1

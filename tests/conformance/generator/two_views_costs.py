@@ -129,8 +129,12 @@ def _turn_slope(rng: np.random.Generator) -> dict[str, Any]:
         "perturbed-from-the-right": slope(lambda e, g: e / g, True),
         "numerator-only": [v / length for v in slope(lambda e, g: e)],
     }
+    e, g = _sampson(R, t, x, y)
     inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist()}
-    return _case(inputs, "J_turn", slope(lambda e, g: e / g), wrong)
+    case = _case(inputs, "J_turn", slope(lambda e, g: e / g), wrong)
+    for answer in (case["expected"], *case.get("mistakes", {}).values()):
+        answer["value"] = float(e / g)
+    return case
 
 
 def _direction_slope(rng: np.random.Generator) -> dict[str, Any]:
@@ -185,8 +189,9 @@ def _cost(rng: np.random.Generator, behind: bool) -> dict[str, Any]:
         if min(abs(v) for v in sides) > mpf("1e-3") and all((v < 0) == behind for v in sides):
             break
     e, g = _sampson(Rm, tm / mpmath.norm(tm), x, y)
-    line, infinity = (e / g) ** 2, _map_cost(Rm, x, y)
-    inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist()}
+    sigma = float(digits(rng.uniform(0.002, 0.02), 3))
+    line, infinity = (e / g / mpf(sigma)) ** 2, _map_cost(Rm, x, y) / mpf(sigma) ** 2
+    inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist(), "sigma": sigma}
     return _case(inputs, "squared", infinity if behind else line, {"side-forgotten": line} if behind else {})
 
 

@@ -51,6 +51,11 @@ def _of_plane(T_b_a: Array, normal: Array, d: float) -> Array:
     return two_views.plane_homography(T_b_a, normal, d)
 
 
+def _turn_slope(T_b_a: Array, xn_a: Array, xn_b: Array) -> dict[str, Any]:
+    at = two_views.sampson_with_jacobians(T_b_a, xn_a, xn_b)
+    return {"value": float(at.residual[0]), "J_turn": at.J_motion[0, 2:]}
+
+
 def _direction_slope(T_b_a: Array, xn_a: Array, xn_b: Array, v: Array) -> float:
     """The two numbers of a direction are those along two vectors across it."""
     J = two_views.sampson_with_jacobians(T_b_a, xn_a, xn_b).J_motion[0, :2]
@@ -71,13 +76,11 @@ TABLE: Answers = {
     "two_views.homography_distance": lambda H, x_a, x_b: float(
         np.sum(two_views.homography_sampson(H, x_a[None], x_b[None]) ** 2)
     ),
-    "two_views.sampson_turn_jacobian": lambda T_b_a, xn_a, xn_b: two_views.sampson_with_jacobians(
-        T_b_a, xn_a, xn_b
-    ).J_motion[0, 2:],
+    "two_views.sampson_turn_jacobian": _turn_slope,
     "two_views.sampson_direction_derivative": _direction_slope,
     "two_views.depths": lambda T_b_a, xn_a, xn_b: two_views.depths(T_b_a, xn_a[None], xn_b[None])[0],
-    "two_views.cheirality_cost": lambda T_b_a, xn_a, xn_b: float(
-        two_views.cheirality(T_b_a, xn_a[None], xn_b[None]).squared[0]
+    "two_views.cheirality_cost": lambda T_b_a, xn_a, xn_b, sigma: float(
+        two_views.cheirality(T_b_a, xn_a[None], xn_b[None], sigma).squared[0]
     ),
     "two_views.draws": lambda share, size, confidence: two_views.draws_needed(share, int(size), confidence),
     "two_views.truncated_cost": lambda squared, most: float(two_views.truncated_cost(squared, most)),
