@@ -43,6 +43,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ): "an angle told beside the cost: no vector asks for it",
     (
         "geometry.multiview.two_views.five_point.five_point_essentials",
+        "w = np.real(np.swapaxes(vectors * _phase(vectors), 1, 2)[..., 6:])  # (S, 10, 4), up to size",
+        "* to /",
+    ): "the eigenvector of a real solution is real: its phase is a sign",
+    (
+        "geometry.multiview.two_views.five_point.five_point_essentials",
         "rank = s[:, 4] / s[:, 0]",
         "/ to *",
     ): "tells two equal pairs; the vectors have none",
