@@ -10,7 +10,7 @@ from mpmath import mpf
 
 from generator.building import Topic, tolerance
 from generator.exact import column, expm, floats, hat, matrix, vector
-from generator.two_views_costs import cost_groups
+from generator.two_views_costs import answers, cost_groups
 from generator.world import digits
 
 TOPIC, CHAPTER = "two_views", 9
@@ -73,20 +73,6 @@ def build(rng: np.random.Generator) -> Topic:
     _motions(topic, rng)
     cost_groups(topic, rng)
     return topic
-
-
-def answers(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
-    """A case, with the mistakes whose answers differ from the right one and from each other."""
-    kept: dict[str, Any] = {}
-    expected = np.asarray(floats(right), dtype=np.float64)
-    for note, value in wrong.items():
-        numbers = np.asarray(floats(value), dtype=np.float64)
-        size = max(1.0, float(np.abs(expected).max()))
-        others = (expected, *(np.asarray(v) for v in kept.values()))
-        if all(np.abs(numbers - other).max() > 1e-3 * size for other in others):
-            kept[note] = numbers.tolist()
-    case: dict[str, Any] = {"inputs": inputs, "expected": {name: expected.tolist()}}
-    return {**case, "mistakes": {n: {name: v} for n, v in kept.items()}} if kept else case
 
 
 def turn(phi: Any) -> Any:

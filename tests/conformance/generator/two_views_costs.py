@@ -48,7 +48,7 @@ def cost_groups(topic: Topic, rng: np.random.Generator) -> None:
     topic.group("two_views.sampson_direction_derivative", "eq-sampson-jacobian", oracle, few, cases)
 
 
-def _case(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
+def answers(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
     """A case, with the mistakes whose answers differ clearly from the right one and from each other."""
     kept: dict[str, Any] = {}
     expected = np.asarray(floats(right), dtype=np.float64)
@@ -87,7 +87,7 @@ def _map_distance(rng: np.random.Generator) -> dict[str, Any]:
         "homography-inverted": _map_cost(back, x, y),
     }
     inputs = {"H": H.tolist(), "x_a": a.tolist(), "x_b": b.tolist()}
-    return _case(inputs, "squared", _map_cost(M, x, y), wrong)
+    return answers(inputs, "squared", _map_cost(M, x, y), wrong)
 
 
 def _motion(rng: np.random.Generator) -> tuple[Any, Any]:
@@ -131,7 +131,7 @@ def _turn_slope(rng: np.random.Generator) -> dict[str, Any]:
     }
     e, g = _sampson(R, t, x, y)
     inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist()}
-    case = _case(inputs, "J_turn", slope(lambda e, g: e / g), wrong)
+    case = answers(inputs, "J_turn", slope(lambda e, g: e / g), wrong)
     for answer in (case["expected"], *case.get("mistakes", {}).values()):
         answer["value"] = float(e / g)
     return case
@@ -154,7 +154,7 @@ def _direction_slope(rng: np.random.Generator) -> dict[str, Any]:
 
     wrong = {"numerator-only": slope(lambda e, g: e) / _sampson(R, t, x, y)[1]}
     inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist(), "v": given.tolist()}
-    return _case(inputs, "slope", slope(lambda e, g: e / g), wrong)
+    return answers(inputs, "slope", slope(lambda e, g: e / g), wrong)
 
 
 def _depths(rng: np.random.Generator) -> dict[str, Any]:
@@ -167,7 +167,7 @@ def _depths(rng: np.random.Generator) -> dict[str, Any]:
     inputs = {"T_b_a": _given(R, t).tolist(), "xn_a": floats([X[0] / X[2], X[1] / X[2]]),
               "xn_b": floats([Y[0] / Y[2], Y[1] / Y[2]])}  # fmt: skip
     wrong = {"swapped": [Y[2], X[2]], "along-the-rays": [mpmath.norm(X), mpmath.norm(Y)]}
-    return _case(inputs, "depths", [X[2], Y[2]], wrong)
+    return answers(inputs, "depths", [X[2], Y[2]], wrong)
 
 
 def _cost(rng: np.random.Generator, behind: bool) -> dict[str, Any]:
@@ -192,7 +192,9 @@ def _cost(rng: np.random.Generator, behind: bool) -> dict[str, Any]:
     sigma = float(digits(rng.uniform(0.002, 0.02), 3))
     line, infinity = (e / g / mpf(sigma)) ** 2, _map_cost(Rm, x, y) / mpf(sigma) ** 2
     inputs = {"T_b_a": T.tolist(), "xn_a": a.tolist(), "xn_b": b.tolist(), "sigma": sigma}
-    return _case(inputs, "squared", infinity if behind else line, {"side-forgotten": line} if behind else {})
+    return answers(
+        inputs, "squared", infinity if behind else line, {"side-forgotten": line} if behind else {}
+    )
 
 
 def _draws(rng: np.random.Generator, k: int) -> dict[str, Any]:
@@ -204,7 +206,7 @@ def _draws(rng: np.random.Generator, k: int) -> dict[str, Any]:
         "one-clean-pair": miss / mpmath.log((1 - mpf(w)) ** m),
     }
     right = miss / mpmath.log(1 - mpf(w) ** m)
-    return _case({"share": w, "size": m, "confidence": p}, "draws", right, wrong)
+    return answers({"share": w, "size": m, "confidence": p}, "draws", right, wrong)
 
 
 def _msac(rng: np.random.Generator) -> dict[str, Any]:
@@ -216,7 +218,7 @@ def _msac(rng: np.random.Generator) -> dict[str, Any]:
         "not-truncated": sum(squared) / len(squared),
     }
     right = sum(min(v, c) for v in squared) / len(squared)
-    return _case({"squared": e.tolist(), "most": most}, "cost", right, wrong)
+    return answers({"squared": e.tolist(), "most": most}, "cost", right, wrong)
 
 
 def _gric(rng: np.random.Generator, dimension: int) -> dict[str, Any]:
@@ -231,4 +233,4 @@ def _gric(rng: np.random.Generator, dimension: int) -> dict[str, Any]:
     cap = 2 * (4 - dimension)
     wrong = {"unknowns-only": criterion(cap, 0), "same-threshold": criterion(2, dimension)}
     inputs = {"squared": e.tolist(), "dimension": dimension, "unknowns": unknowns}
-    return _case(inputs, "criterion", criterion(cap, dimension), wrong)
+    return answers(inputs, "criterion", criterion(cap, dimension), wrong)

@@ -19,8 +19,7 @@ module                  holds
 **One way through.**  Everything works in normalised positions ``xn (N, 2)``: pixels through the inverse of
 the lens (:meth:`~vslam_ref.geometry.cameras.Camera.unproject`, divided by the third coordinate).
 ``sigma`` is the standard deviation of one coordinate in this unit: pixels over the focal length.  Costs
-are per pair, in units of
-:math:`\sigma^2`; with ``sigma = 1 / f`` they are squared pixels::
+are per pair, in units of :math:`\sigma^2`; with ``sigma = 1 / f`` they are squared pixels::
 
     E = essential_consensus(xn_a, xn_b, rng, sigma=sigma)           # .model, .inliers, .cost, .reason
     H = homography_consensus(xn_a, xn_b, rng, sigma=sigma)
