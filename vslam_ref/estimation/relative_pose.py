@@ -184,9 +184,10 @@ def estimate_motion(
 
     Parameters
     ----------
-    xn_a, xn_b, sigma
-        As for :func:`refine_motion`, as are the errors; many pairs may be wrong.
+    xn_a, xn_b : array_like, shape (N, 2)
+        As for :func:`refine_motion`, as ``sigma`` and the errors; many pairs may be wrong.
     rng : numpy.random.Generator
+    sigma : float
     draws : Draws, optional
         How samples are drawn.
 
