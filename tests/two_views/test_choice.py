@@ -17,7 +17,7 @@ SIGMA = 1 / 500
 @pytest.mark.parametrize("kind", ["space", "plane"])
 def test_no_motion_is_wrong_without_a_reason(pair, kind: str) -> None:
     accepted = 0
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         s = pair(rng, 150, kind, sigma_px=1.0, wrong=0.3)
         found = estimate_motion(s.a, s.b, rng, sigma=SIGMA)
@@ -25,12 +25,12 @@ def test_no_motion_is_wrong_without_a_reason(pair, kind: str) -> None:
         # a wrong answer of a plane or a mirrored one is tens of degrees off; a pixel of noise up to seven
         assert found.reason or apart(found.T_b_a, s.T_b_a) < np.radians(8)
     if kind == "space":
-        assert accepted >= 7
+        assert accepted >= 4
 
 
 def test_the_rivals_of_a_plane_are_told_with_their_costs(pair) -> None:
     refused = 0
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         s = pair(rng, 100, "plane", sigma_px=0.5)
         found = estimate_motion(s.a, s.b, rng, sigma=SIGMA)
@@ -53,7 +53,7 @@ def test_the_rivals_of_a_plane_are_told_with_their_costs(pair) -> None:
     [("space", Degeneracy.NONE), ("plane", Degeneracy.PLANE), ("turn", Degeneracy.PURE_ROTATION)],
 )
 def test_each_case_has_its_name(pair, kind: str, wanted: Degeneracy) -> None:
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         s = pair(rng, 100, kind, sigma_px=0.5)
         found = estimate_motion(s.a, s.b, rng, sigma=SIGMA / 2)
@@ -91,10 +91,10 @@ def test_far_points_do_not_let_a_wrong_motion_win(pair) -> None:
 
 @pytest.mark.parametrize("loss", [None, "huber", "tukey"])
 def test_the_refined_motion_beats_its_start_and_its_covariance_is_right(pair, loss: str | None) -> None:
-    """Errors over 30 runs in units of the stated covariance: chi-square of five numbers each."""
+    """Errors over 20 runs in units of the stated covariance: chi-square of five numbers each."""
     total, wrong = 0.0, 0.1 if loss == "tukey" else 0.0
     rng = np.random.default_rng(1)
-    for _ in range(30):
+    for _ in range(20):
         s = pair(rng, 80, sigma_px=0.5, wrong=wrong)
         start = two_views.perturb(s.T_b_a, rng.normal(0, 0.002, 5))
         found = refine_motion(s.a, s.b, start, sigma=SIGMA / 2, loss=None if loss is None else tuned(loss))
@@ -102,9 +102,9 @@ def test_the_refined_motion_beats_its_start_and_its_covariance_is_right(pair, lo
         assert found.cov_motion is not None
         delta = difference(found.T_b_a, s.T_b_a)
         total += delta @ np.linalg.solve(found.cov_motion, delta)
-    # 150 degrees of freedom: 4 standard deviations of sqrt(300); the robust losses lose 5 % of efficiency,
+    # 100 degrees of freedom: 4 standard deviations of sqrt(200); the robust losses lose 5 % of efficiency,
     # and a fixed final weight is a little too sure (some 10 %)
-    assert 150 - 4 * 17.3 < total < (150 + 4 * 17.3) * (1.0 if loss is None else 1.2)
+    assert 100 - 4 * 14.1 < total < (100 + 4 * 14.1) * (1.0 if loss is None else 1.2)
 
 
 def difference(T: np.ndarray, S: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ from vslam_ref.estimation.robust import Loss, tuned
 from vslam_ref.geometry.multiview import two_views
 from vslam_ref.geometry.multiview.epipolar import essential_from_motion
 from vslam_ref.geometry.multiview.two_views import Choice, Consensus, Degeneracy, Draws, Verdict
+from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma
 from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION
 
 LEAST = 5
@@ -153,8 +154,7 @@ def refine_motion(
     T = as_array("T_start", T_start, 4, 4)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise ValueError(f"T_start of shape {T.shape}: need a finite (4, 4)")
-    if not 0.0 < sigma < np.inf:
-        raise ValueError(f"sigma={sigma}: must be finite and more than 0 (pixels over focal length)")
+    sigma = checked_sigma(sigma)
     T = two_views.perturb(T, np.zeros(5))
     if len(a) < LEAST:
         why = f"{len(a)} pairs: a relative pose needs at least {LEAST}"
@@ -178,26 +178,22 @@ def estimate_motion(
 ) -> MotionEstimate:
     """Motion between two pictures from pairs of which many may be wrong, or the reason why there is none.
 
-    Implements :eq:`eq-choice` on the motions of both models, each refined by :eq:`eq-motion-refined`.
+    Implements A§2.2.2, the start from two frames: :eq:`eq-choice` on the motions of both models, each
+    refined by
+    :eq:`eq-motion-refined`.
 
     Parameters
     ----------
     xn_a, xn_b : array_like, shape (N, 2)
-        Normalised positions.
+        As for :func:`refine_motion`, as ``sigma`` and the errors; many pairs may be wrong.
     rng : numpy.random.Generator
     sigma : float
-        Standard deviation of one coordinate of the right pairs: pixels over focal length.
     draws : Draws, optional
         How samples are drawn.
 
     Returns
     -------
     MotionEstimate
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit, a number is not finite, or ``sigma`` is not positive.
 
     Notes
     -----
@@ -277,12 +273,9 @@ def _verdict(a: Array, b: Array, choice: Choice, H: Consensus, sigma: float) -> 
 
 
 def _pairs(xn_a: ArrayLike, xn_b: ArrayLike) -> tuple[Array, Array]:
-    a, b = as_array("xn_a", xn_a, 2), as_array("xn_b", xn_b, 2)
-    if a.ndim != 2 or a.shape != b.shape:
-        raise ValueError(f"xn_a {a.shape} and xn_b {b.shape}: need (N, 2) twice")
-    bad = np.flatnonzero(~(np.isfinite(a) & np.isfinite(b)).all(axis=1))
-    if len(bad):
-        raise ValueError(f"pair {bad[0]} is {a[bad[0]].tolist()}, {b[bad[0]].tolist()}: must be finite")
+    a, b = checked_pairs(xn_a, xn_b)
+    if a.ndim != 2:
+        raise ValueError(f"xn_a has shape {a.shape}: need (N, 2)")
     return a, b
 
 

@@ -32,6 +32,7 @@ HELPERS = (
     "resecting",
     "similarity",
     "two_maps",
+    "two_views_costs",
     "views",
 )
 

@@ -36,6 +36,27 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "a = (a / a.sum(axis=1, keepdims=True))[..., None, None]",
         "/ to *",
     ): "the equations are homogeneous: their common factor cancels",
+    (
+        "geometry.multiview.two_views.cheirality.cheirality",
+        "parallax = np.arctan2(np.linalg.norm(across, axis=-1), np.sum(a * b, axis=-1))",
+        "* to /",
+    ): "an angle told beside the cost: no vector asks for it",
+    (
+        "geometry.multiview.two_views.five_point.five_point_essentials",
+        "w = np.real(np.swapaxes(vectors * _phase(vectors), 1, 2)[..., 6:])  # (S, 10, 4), up to size",
+        "* to /",
+    ): "the eigenvector of a real solution is real: its phase is a sign",
+    (
+        "geometry.multiview.two_views.five_point.five_point_essentials",
+        "rank = s[:, 4] / s[:, 0]",
+        "/ to *",
+    ): "tells two equal pairs; the vectors have none",
+    (
+        "geometry.multiview.two_views.five_point.five_point_essentials",
+        "E, left = _polished(w[sample, place] / length[sample, place, None], basis[sample])",
+        "/ to *",
+    ): "the steps bring the coefficients back to length 1",
+    ("geometry.multiview.two_views.decompose.homography_motions", "n = turned[:, None] * n", "* to /"): SIGNS,
     ("geometry.sim3.left_jacobian", "J = one + A @ J / n", "factors exchanged"): COMMUTE,
     ("geometry.sim3.left_jacobian", "J = (J + adjoint(exp(part)) @ J) / 2", "factors exchanged"): COMMUTE,
     (

@@ -44,6 +44,7 @@ def essential_from_motion(T_b_a: ArrayLike) -> Array:
 def fundamental_from_essential(E: ArrayLike, K_a: ArrayLike, K_b: ArrayLike) -> Array:
     """F = K_b^-T E K_a^-1, (..., 3, 3): the same relation between the pixels (u, v, 1) of pinholes.
 
+    Implements :eq:`eq-fundamental`.
     ``E (..., 3, 3)``, ``K_a (..., 3, 3)``, ``K_b (..., 3, 3)``; focal lengths and centres in pixels.
     """
     inverse_a = np.asarray(np.linalg.inv(as_array("K_a", K_a, 3, 3)), dtype=np.float64)

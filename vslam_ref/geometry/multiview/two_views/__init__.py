@@ -6,7 +6,7 @@ module                  holds
 ``book``                the algorithms for one pair of pictures, to be read
 ``eight_point``         ``linear_essential``, ``linear_fundamental``, ``nearest_essential``
 ``five_point``          ``five_point_essentials``: all essential matrices of many samples of five
-``homography``          ``fit_homography``, ``apply_homography``
+``homography``          ``fit_homography``, ``apply_homography``, ``plane_homography``
 ``decompose``           ``essential_motions`` (four), ``homography_motions`` (two, with normals)
 ``sampson``             signed distances: ``sampson``, ``sampson_with_jacobians`` of a relative pose and its
                         five numbers, ``perturb``, ``essential_sampson``, ``homography_sampson``
@@ -19,8 +19,7 @@ module                  holds
 **One way through.**  Everything works in normalised positions ``xn (N, 2)``: pixels through the inverse of
 the lens (:meth:`~vslam_ref.geometry.cameras.Camera.unproject`, divided by the third coordinate).
 ``sigma`` is the standard deviation of one coordinate in this unit: pixels over the focal length.  Costs
-are per pair, in units of
-:math:`\sigma^2`; with ``sigma = 1 / f`` they are squared pixels::
+are per pair, in units of :math:`\sigma^2`; with ``sigma = 1 / f`` they are squared pixels::
 
     E = essential_consensus(xn_a, xn_b, rng, sigma=sigma)           # .model, .inliers, .cost, .reason
     H = homography_consensus(xn_a, xn_b, rng, sigma=sigma)
@@ -63,7 +62,11 @@ from vslam_ref.geometry.multiview.two_views.eight_point import (
     nearest_essential,
 )
 from vslam_ref.geometry.multiview.two_views.five_point import FivePointEssentials, five_point_essentials
-from vslam_ref.geometry.multiview.two_views.homography import apply_homography, fit_homography
+from vslam_ref.geometry.multiview.two_views.homography import (
+    apply_homography,
+    fit_homography,
+    plane_homography,
+)
 from vslam_ref.geometry.multiview.two_views.sampson import (
     SampsonJacobians,
     essential_sampson,
@@ -104,6 +107,7 @@ __all__ = [
     "linear_fundamental",
     "nearest_essential",
     "perturb",
+    "plane_homography",
     "sampson",
     "sampson_with_jacobians",
     "torr_criterion",

@@ -55,7 +55,7 @@ def linear_essential(xn_a: ArrayLike, xn_b: ArrayLike) -> LinearEssential:
     Parameters
     ----------
     xn_a, xn_b : array_like, shape (..., N, 2)
-        Normalised image positions of the same points, N at least 8.
+        Normalised image positions of the same points, N at least 8; no unit.
 
     Returns
     -------

@@ -105,7 +105,7 @@ def five_point_essentials(xn_a: ArrayLike, xn_b: ArrayLike) -> FivePointEssentia
     values, vectors = np.linalg.eig(M)
     size = 1.0 + np.abs(values)
     real = (np.abs(values.imag) <= REAL * size) & (solvable & (rank > RANK))[:, None]
-    w = np.real(np.swapaxes(vectors * _phase(vectors), 1, 2)[..., 6:])  # (S, 10, 4): x, y, z, 1 up to size
+    w = np.real(np.swapaxes(vectors * _phase(vectors), 1, 2)[..., 6:])  # (S, 10, 4), up to size
     length = np.linalg.norm(w, axis=-1)
     real &= length > 0
     sample, place = np.nonzero(real)

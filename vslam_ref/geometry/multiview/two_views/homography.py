@@ -61,8 +61,39 @@ def fit_homography(x_a: ArrayLike, x_b: ArrayLike) -> Array:
     return np.asarray(H * sign[..., None, None])
 
 
+def plane_homography(T_b_a: ArrayLike, normal: ArrayLike, distance: ArrayLike) -> Array:
+    """R + t n^T / d (..., 3, 3), the homography of a plane between normalised positions.
+
+    Implements :eq:`eq-plane-homography`.
+
+    Parameters
+    ----------
+    T_b_a : array_like, shape (..., 4, 4)
+        From camera a to camera b.
+    normal : array_like, shape (..., 3)
+        Of the plane n . X_a = d in the frame of camera a.
+    distance : array_like, shape (...)
+        d, in the unit of the translation; not zero.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, or a distance is zero.
+
+    Examples
+    --------
+    >>> plane_homography(np.eye(4), [0.0, 0.0, 1.0], 2.0).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    T, n = as_array("T_b_a", T_b_a, 4, 4), as_array("normal", normal, 3)
+    d = np.asarray(distance, dtype=np.float64)[..., None, None]
+    if (d == 0.0).any():
+        raise ValueError("the plane passes through camera a: its distance must not be 0")
+    return np.asarray(T[..., :3, :3] + T[..., :3, 3, None] * n[..., None, :] / d)
+
+
 def apply_homography(H: ArrayLike, x: ArrayLike) -> Array:
-    """Images (..., N, 2) of points ``x (..., N, 2)`` under ``H (..., 3, 3)``; the unit is that of H.
+    """Images (..., N, 2) of points ``x (..., N, 2)`` under ``H (..., 3, 3)``; normalised, or in pixels.
 
     Implements :eq:`eq-plane-homography`.  On the line that H sends to infinity the answer is infinite.
     """
