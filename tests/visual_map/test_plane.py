@@ -16,7 +16,9 @@ def floor(count: int, noise: float = 0.0, seed: int = 0, away: float = 3.0) -> n
     """Points (count, 3) of the plane n X = away, within 2 of its foot."""
     rng = np.random.default_rng(seed)
     across = np.linalg.svd(NORMAL[None])[2][1:]
-    return away * NORMAL + rng.uniform(-2, 2, (count, 2)) @ across + noise * rng.normal(size=(count, 1)) * NORMAL
+    return (
+        away * NORMAL + rng.uniform(-2, 2, (count, 2)) @ across + noise * rng.normal(size=(count, 1)) * NORMAL
+    )
 
 
 def cloud(count: int, seed: int = 1) -> np.ndarray:
