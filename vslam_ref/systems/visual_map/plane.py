@@ -1,12 +1,15 @@
-r"""The plane on which most points of a map lie: a floor, a table, a wall.
+r"""The plane that fills most of a map: a floor, a table, a wall.
 
 With :math:`d_j = n^T X_j - h` the distance of a point from a plane, samples of three points compete for the least
 
-.. math:: \sum_j \min(d_j^2,\; c^2)
+.. math:: \sum_j w_j \min(d_j^2,\; c^2)
 
-(MSAC), and the winner is fitted by least squares to the points within c, anew until these stay the same.
+(MSAC), and the winner is fitted by weighted least squares to the points within c, anew until these stay the same.
 Neither step can raise the sum: the best plane of the points within c lowers their part, and a point that
 then leaves or comes in lowers its own.
+
+A plane is wide; a textured thing is a clump of points, and through any three clumps there is a plane.  So
+points share a vote with all others of their cell, a cube with side 2 c: :math:`w_j` is one over their number.
 """
 
 from __future__ import annotations
@@ -18,14 +21,16 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 
-SHARE = 0.05
+SHARE = 0.075
 """Of the points' median distance from their middle: how far from a plane a point may lie by default."""
-LEAST_SHARE = 0.15
-"""Of the points, that a plane must hold.  Through the middle of a round cloud any plane holds 6 %."""
+CELL = 2.0
+"""Side of a cell over c."""
+LEAST_SHARE = 0.2
+"""Of the votes, that a plane must hold.  Through the middle of a round cloud any plane holds 10 %."""
 FEW = 12
 """Points that a plane must hold."""
-DRAWS = 500
-"""Samples: a plane that holds 25 % of the points is hit with probability 1 - (1 - 1/64)^500 = 0.9996."""
+DRAWS = 1000
+"""Samples: a plane that holds 20 % of the points is hit with probability 1 - (1 - 1/125)^1000 = 0.9997."""
 REFITS = 20
 AT_ONCE = 2_000_000
 """Distances that are held in memory at once."""
@@ -39,7 +44,7 @@ class Plane(NamedTuple):
     Attributes
     ----------
     T_plane_world : ndarray, shape (4, 4)
-        The plane is z = 0, its middle the mean of the points in it.  The z axis points to the side of the
+        The plane is z = 0, its origin the (weighted) mean of the points in it.  The z axis points to the side of the
         world's origin (of the first camera, in a map); the x axis is the world's x axis laid into the plane, or
         its z axis where the plane stands across x.
     inliers : ndarray of bool, shape (N,)
@@ -56,7 +61,7 @@ class Plane(NamedTuple):
 def dominant_plane(
     X_world: ArrayLike, rng: np.random.Generator, *, tolerance: float | None = None, draws: int = DRAWS
 ) -> Plane:
-    """Find the plane on which most points lie.
+    """Find the plane that fills most of a map.
 
     Parameters
     ----------
@@ -96,30 +101,35 @@ def dominant_plane(
     if len(X) < FEW:
         return _none(len(X), f"the map has {len(X)} points: need {FEW}")
     c = SHARE * _extent(X) if tolerance is None else tolerance
-    n, h = _best_sample(X, c, _samples(len(X), draws, rng))
+    if c == 0:
+        return _none(len(X), "most points lie at one place")
+    vote = _votes(X, CELL * c)
+    n, h = _best_sample(X, vote, c, _samples(len(X), draws, rng))
     if not n.any():
         return _none(len(X), "all samples of three points lie on a line")
     inside = _within(X, n, h, c)
     for _ in range(REFITS):
-        if len(X[inside]) < 3:
+        if inside.sum() < 3:
             break
-        n, h = _fitted(X[inside])
+        n, h = _fitted(X[inside], vote[inside])
         before, inside = inside, _within(X, n, h, c)
         if (before == inside).all():
             break
-    return _judged(X, n, inside)
+    return _judged(X, vote, n, inside)
 
 
-def _judged(X: Array, n: Array, inside: BoolArray) -> Plane:
+def _judged(X: Array, vote: Array, n: Array, inside: BoolArray) -> Plane:
     """The plane as a frame, or why it is none."""
-    count = int(inside.sum())
-    if count < max(FEW, LEAST_SHARE * len(X)):
-        need = f"need {LEAST_SHARE:.0%}, and {FEW}"
-        return _none(len(X), f"the best plane holds {count} of {len(X)} points: {need}")
+    count, share = int(inside.sum()), float(vote[inside].sum() / vote.sum())
+    if count < FEW or share < LEAST_SHARE:
+        need = f"need {LEAST_SHARE:.0%}, and {FEW} points"
+        return _none(
+            len(X), f"the best plane holds {share:.1%} of the space with points, {count} points: {need}"
+        )
     spread = np.linalg.svd(X[inside] - X[inside].mean(0), compute_uv=False)
     if spread[1] <= 1e-6 * spread[0]:
         return _none(len(X), "the points lie on a line")
-    return Plane(_frame(X[inside].mean(0), n), inside, "")
+    return Plane(_frame(np.average(X[inside], 0, vote[inside]), n), inside, "")
 
 
 def _none(count: int, reason: str) -> Plane:
@@ -129,6 +139,12 @@ def _none(count: int, reason: str) -> Plane:
 def _extent(X: Array) -> float:
     """Median distance of the points from their middle."""
     return float(np.median(np.linalg.norm(X - np.median(X, axis=0), axis=1)))
+
+
+def _votes(X: Array, side: float) -> Array:
+    """One over the number of points in the same cell, (N,)."""
+    _, cell, count = np.unique(np.floor(X / side), axis=0, return_inverse=True, return_counts=True)
+    return 1.0 / count[cell.ravel()]
 
 
 def _samples(count: int, draws: int, rng: np.random.Generator) -> IntArray:
@@ -142,7 +158,7 @@ def _samples(count: int, draws: int, rng: np.random.Generator) -> IntArray:
     return np.stack([first, second, third], 1)
 
 
-def _best_sample(X: Array, c: float, samples: IntArray) -> tuple[Array, float]:
+def _best_sample(X: Array, vote: Array, c: float, samples: IntArray) -> tuple[Array, float]:
     """Normal and distance of the plane through three points with the least sum; zeros if all lie on lines."""
     a, b, d = (X[samples[:, k]] for k in range(3))
     across = np.cross(b - a, d - a)
@@ -153,7 +169,7 @@ def _best_sample(X: Array, c: float, samples: IntArray) -> tuple[Array, float]:
     n = across[proper] / area[proper, None]
     h = np.einsum("ki,ki->k", n, a[proper])
     parts = np.array_split(np.arange(len(n)), -(-len(n) * len(X) // AT_ONCE))
-    cost = [np.minimum((X @ n[k].T - h[k]) ** 2, c**2).sum(0) for k in parts]
+    cost = [vote @ np.minimum((X @ n[k].T - h[k]) ** 2, c**2) for k in parts]
     best = int(np.argmin(np.concatenate(cost)))
     return n[best], float(h[best])
 
@@ -162,10 +178,10 @@ def _within(X: Array, n: Array, h: float, c: float) -> BoolArray:
     return np.asarray(np.abs(X @ n - h) < c)
 
 
-def _fitted(X: Array) -> tuple[Array, float]:
-    """Plane with the least sum of squared distances: through the mean, across the least direction."""
-    middle = X.mean(0)
-    n = np.linalg.svd(X - middle, full_matrices=False)[2][2]
+def _fitted(X: Array, vote: Array) -> tuple[Array, float]:
+    """Plane with the least weighted sum of squared distances: through the mean, across the least direction."""
+    middle = np.average(X, 0, vote)
+    n = np.linalg.svd(np.sqrt(vote)[:, None] * (X - middle), full_matrices=False)[2][2]
     return n, float(n @ middle)
 
 
