@@ -24,6 +24,7 @@ from vslam_ref.datasets.text import FormatError
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.metrics.trajectory import MAX_DIFFERENCE, Trajectory, associate
 from vslam_ref.support.errors import InputError, suggestion
+from vslam_ref.worlds.rendered import NAMES
 
 DEEP = "values of 16 bits: 0 to 65535 became 0 to 255"
 LOOKED_AT = 32
@@ -114,9 +115,9 @@ def _place(source: str) -> Path | None:
     names = {data_set.name for data_set in DATA_SETS}
     if source in names:
         return catalogue.require(source)
-    known = [*scenes.NAMES, *names]
+    known = [*NAMES, *names]
     what = f"no folder, video, scene or data set {source!r}{suggestion(source, known)}"
-    raise InputError(f"{what}; scenes: {', '.join(scenes.NAMES)}")
+    raise InputError(f"{what}; scenes: {', '.join(NAMES)}")
 
 
 def _folder(folder: Path, options: Options) -> Sequence:
@@ -146,8 +147,8 @@ def _rendered(source: str, options: Options) -> Sequence:
         raise InputError(f"scene {source} has its own camera: leave --camera out")
     scene = scenes.open_scene(source)
     count, place = len(scene.times), f"scene {source}"
-    taken = Taken(source, scene.size, count, scene.picture, scene.camera, place)
-    found = Contents("rendered", (), scene.times, None, scene.truth, np.arange(count), place)
+    taken = Taken(source, scene.size, count, lambda k: Picture(scene.frame(k)), scene.camera, place)
+    found = Contents("rendered", (), scene.times, None, scene.trajectory(), np.arange(count), place)
     return _joined(taken, found, options, ())
 
 

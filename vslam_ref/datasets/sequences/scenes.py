@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import NamedTuple
 
-from vslam_ref.arrays import Array
-from vslam_ref.datasets.pictures import Picture
-from vslam_ref.geometry.cameras import Camera
-from vslam_ref.metrics.trajectory import Trajectory
+from vslam_ref.worlds.rendered import NAMES, Scene, scene
 
-NAMES: tuple[str, ...] = ()
-
-
-class SceneSource(NamedTuple):
-    """What a sequence needs of a scene."""
-
-    size: tuple[int, int]
-    times: Array
-    camera: Camera
-    truth: Trajectory
-    picture: Callable[[int], Picture]
+SEED = 1
+"""Where none is given."""
+_SOURCE = re.compile(rf"({'|'.join(NAMES)})(?::([0-9]{{1,9}}))?")
 
 
 def is_scene(source: str) -> bool:
     """Whether a source is the name of a scene, with or without a seed."""
-    return re.fullmatch(rf"({'|'.join(NAMES)})(:[0-9]{{1,9}})?", source) is not None if NAMES else False
+    return _SOURCE.fullmatch(source) is not None
 
 
-def open_scene(source: str) -> SceneSource:
-    """Return the scene of that name and seed."""
-    raise NotImplementedError
+def open_scene(source: str) -> Scene:
+    """Return the scene of that name and seed.
+
+    Raises
+    ------
+    ValueError
+        If the source is no such name.
+    """
+    match = _SOURCE.fullmatch(source)
+    if match is None:
+        raise ValueError(f"source {source!r}: need {', '.join(NAMES)}, with or without a seed, as desk:7")
+    return scene(match[1], SEED if match[2] is None else int(match[2]))

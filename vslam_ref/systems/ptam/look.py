@@ -29,8 +29,8 @@ def peaks(picture: Picture, level: int, settings: FeatureSettings) -> IntArray:
     return corners.xy[is_peak(corners, score)]
 
 
-def strong_corners(picture: Picture, level: int, settings: FeatureSettings, most: int) -> IntArray:
-    """Numbers of a level's corners that are peaks and strong, strongest first, at most ``most``."""
+def strong_corners(picture: Picture, level: int, settings: FeatureSettings) -> IntArray:
+    """Numbers of a level's corners that are peaks and strong, strongest first."""
     image, corners = picture.levels[level], picture.corners[level]
     peak = is_peak(corners, corner_score(image, corners.xy, settings.arc))
     height, width = image.shape
@@ -39,5 +39,18 @@ def strong_corners(picture: Picture, level: int, settings: FeatureSettings, most
     number = np.flatnonzero(peak & inner)
     strength: Array = shi_tomasi(image, corners.xy[number])
     order = np.argsort(-strength, kind="stable")
-    order = order[strength[order] >= settings.least_eigenvalue]
-    return number[order[:most]]
+    strong: IntArray = number[order[strength[order] >= settings.least_eigenvalue]]
+    return strong
+
+
+def spread(xy: IntArray, shape: tuple[int, ...], count: int) -> IntArray:
+    """Rows of at most ``count`` points, strongest first, so that all parts of a picture have their share."""
+    side = max(int(np.ceil(np.sqrt(shape[0] * shape[1] / max(count, 1) * 3.0))), 8)
+    cell = xy[:, 1] // side * (shape[1] // side + 1) + xy[:, 0] // side
+    order = np.argsort(cell, kind="stable")
+    start = np.concatenate([[True], np.diff(cell[order]) != 0]) if len(order) else np.zeros(0, bool)
+    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0)) if len(order) else order
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order)) - first
+    chosen: IntArray = np.sort(np.argsort(rank, kind="stable")[:count])
+    return chosen

@@ -28,7 +28,8 @@ class KeyframePolicy:
         inliers = tracked.fine.inliers
         self.best = max(self.best, inliers)
         may = tracked.quality is not Quality.LOST and inliers >= s.least_inliers
-        if not may or tracked.pose.sigma > s.worst_sigma or self.since < s.gap:
+        wait = s.gap if inliers >= s.starving else s.gap_starving
+        if not may or tracked.pose.sigma > s.worst_sigma or self.since < wait:
             return False
         away = distance(visual_map, tracked)
         few = inliers < s.fewer * self.best and away > s.distance

@@ -104,8 +104,12 @@ class Ptam:
         if self.trails.length < s.least_motion:
             return Outcome(picture.number)
         found = attempt(self.camera, self.trails, s, self.rng)
-        if not isinstance(found, str) and not found.reason:
+        if isinstance(found, str):
+            return Outcome(picture.number, attempt=found)
+        if not found.reason:
             self._start(found)
+        elif found.agrees.sum() > s.keep * len(self.trails.now):
+            self.trails = self.trails.only(found.row[found.agrees], found.uv_b[found.agrees])
         return Outcome(picture.number, attempt=found)
 
     def _start(self, found: Attempt) -> None:

@@ -70,6 +70,8 @@ class KeyframeSettings:
     least_inliers: int = assume(50, "points", "trap: a starved map must be fed")
     worst_sigma: float = assume(1.5, "px of the level", "a pose that is not good enough spoils the map")
     gap: int = assume(4, "pictures", "since the last; PTAM's 20 starve on quick turns")
+    starving: int = assume(120, "points", "fewer inliers: the map is about to end, and the next gap counts")
+    gap_starving: int = assume(2, "pictures", "since the last, when the map is about to end")
     fewer: float = assume(0.8, "share", "of the best inliers since the last keyframe, at some distance")
     much_fewer: float = assume(0.65, "share", "at any distance")
     distance: float = assume(0.03, "of the median depth", "from the nearest keyframe, with fewer inliers")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.relative_pose import estimate_motion
 from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.features import level_sigma
@@ -41,6 +41,10 @@ class Attempt(NamedTuple):
         Median, degrees.
     reason : str
         Empty if this is a start.
+    row : ndarray of int64, shape (n,)
+        Numbers of these trails.
+    agrees : ndarray of bool, shape (n,)
+        Whether their distance from the motion's epipolar lines is small.
     """
 
     T_b_a: Array
@@ -53,6 +57,8 @@ class Attempt(NamedTuple):
     rivals: tuple[tuple[str, float], ...]
     parallax: float
     reason: str
+    row: IntArray
+    agrees: BoolArray
 
 
 def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Generator) -> Attempt | str:
@@ -65,7 +71,7 @@ def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Gen
     a, b = camera.unproject(uv_a), camera.unproject(uv_b)
     sigma = 1.0 / float(np.sqrt(camera.fx * camera.fy))
     found = estimate_motion(a.xn, b.xn, rng, sigma=sigma)
-    return _judged(camera, found, uv_a, uv_b, level, s)
+    return _judged(camera, found, uv_a, uv_b, level, s)._replace(row=np.flatnonzero(ok))
 
 
 def _judged(camera, found, uv_a, uv_b, level, s):  # type: ignore[no-untyped-def]
@@ -92,7 +98,7 @@ def _judged(camera, found, uv_a, uv_b, level, s):  # type: ignore[no-untyped-def
     if not reason and spread < s.depth_spread:
         reason = f"depths differ by a factor of {spread:.2f}: need {s.depth_spread:g}"
     return Attempt(
-        T, uv_a, uv_b, level, good, points.X_world, cost, rivals, parallax, reason
+        T, uv_a, uv_b, level, good, points.X_world, cost, rivals, parallax, reason, np.arange(len(uv_a)), found.inliers
     )
 
 

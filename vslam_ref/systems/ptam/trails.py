@@ -8,7 +8,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
-from vslam_ref.systems.ptam.look import strong_corners
+from vslam_ref.systems.ptam.look import spread, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings, StartSettings
 from vslam_ref.systems.visual_map import Picture
 
@@ -40,31 +40,22 @@ class Trails:
         """Median distance that the points have moved, pixels."""
         return float(np.median(np.hypot(*(self.now - self.first).T))) if len(self.now) else 0.0
 
+    def only(self, rows: IntArray, now: Array) -> Trails:
+        """Return some of them (m,), with better places (m, 2)."""
+        return Trails(self.pictures, self.level[rows], self.first[rows], now, self.speed[rows])
+
 
 def begin(picture: Picture, s: StartSettings, f: FeatureSettings) -> Trails:
     """Take the strongest corners of a picture, spread over it."""
     level, place = [], []
     for each in LEVELS:
-        number = strong_corners(picture, each, f, 20 * s.trails)
+        number = strong_corners(picture, each, f)
         xy = picture.corners[each].xy[number]
         rows = spread(xy, picture.levels[each].shape, s.trails // (1 + each))
         level.append(np.full(len(rows), each))
         place.append(finest_from_level(xy[rows], each))
     uv = np.concatenate(place)
     return Trails([picture], np.concatenate(level), uv, uv.copy(), np.zeros_like(uv))
-
-
-def spread(xy: IntArray, shape: tuple[int, ...], count: int) -> IntArray:
-    """Rows of at most ``count`` points, strongest first, so that all parts of a picture have their share."""
-    side = max(int(np.ceil(np.sqrt(shape[0] * shape[1] / max(count, 1) * 3.0))), 8)
-    cell = xy[:, 1] // side * (shape[1] // side + 1) + xy[:, 0] // side
-    order = np.argsort(cell, kind="stable")
-    start = np.concatenate([[True], np.diff(cell[order]) != 0]) if len(order) else np.zeros(0, bool)
-    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0)) if len(order) else order
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order)) - first
-    chosen: IntArray = np.sort(np.argsort(rank, kind="stable")[:count])
-    return chosen
 
 
 def go_on(trails: Trails, picture: Picture, s: StartSettings) -> Trails:

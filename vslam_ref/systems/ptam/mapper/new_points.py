@@ -12,7 +12,7 @@ from vslam_ref.features import Templates, finest_from_level, level_from_finest, 
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.multiview import Views
-from vslam_ref.systems.ptam.look import peaks, strong_corners
+from vslam_ref.systems.ptam.look import peaks, spread, strong_corners
 from vslam_ref.systems.ptam.mapper.curve_search import Corner, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
 from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, shared_points
@@ -42,10 +42,10 @@ def new_points(
     added = [np.zeros(0, np.int64)]
     median = median_depth(visual_map, kf)
     for level in reversed(range(visual_map.levels)):
-        number = strong_corners(picture, level, f, s.new_points)
-        xy = picture.corners[level].xy[number]
+        xy = picture.corners[level].xy[strong_corners(picture, level, f)]
         xy = xy[free(visual_map, kf, xy, level, s.spacing)]
         xy = xy[cut(picture.levels[level], xy).inside]
+        xy = xy[spread(xy, picture.levels[level].shape, s.new_points)]
         for partner in partners(visual_map, kf, s.partners):
             if len(xy) == 0:
                 break

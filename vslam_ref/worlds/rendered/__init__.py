@@ -1,0 +1,24 @@
+"""Rendered scenes: what a camera sees of flat textured things, with exact poses, depths and tracks.
+
+::
+
+    scenes      desk, corridor, rotation, building: things and a path, from a seed
+      quads       rectangles and boxes               motion      smooth paths, a hand's tremor
+      painting    grey values of their surfaces      scene       pictures, depth, tracks, effects
+    raster      from quads to pixels                 textures    mip levels, footprints
+
+    Scene.frame(k):   T_cam_world -> placed (a homography for each quad, a box in the image)
+                                  -> nearest (H, W) -> shade (H, W) -> borders again, finer
+                                  -> mean over the shutter, exposure, noise -> uint8 (H, W)
+
+Everything is exact but the grey values: poses are those of a function of time, depths those of planes, and a
+point's pixel is the camera's own projection.  Grey values are means over each pixel's footprint, so corners
+stay where their points are projected, which a test measures.  Lengths are real metres; z points up, and a
+camera's frame is x right, y down, z ahead.  With NumPy a picture of 640 x 480 takes about half a second,
+with Numba a fifteenth of it.
+"""
+
+from vslam_ref.worlds.rendered.scene import Effects, Scene, Tracks
+from vslam_ref.worlds.rendered.scenes import NAMES, pinhole, scene, wide
+
+__all__ = ["NAMES", "Effects", "Scene", "Tracks", "pinhole", "scene", "wide"]
