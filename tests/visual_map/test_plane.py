@@ -30,8 +30,8 @@ def found(X: np.ndarray, seed: int = 0, **more: float) -> plane.Plane:
 
 
 def test_a_plane_among_as_many_other_points_is_found_with_its_frame() -> None:
-    """Exact points: the plane is off by the others within c = 0.1 of it, some 10 with a mean of up to 0.1 each
-    beside 200 points: 0.1 * 10 / 210 = 0.005, doubled by their larger votes.
+    """Exact points: the plane is off by the others within c = 0.1 of it, some 10 with a mean of up to 0.1
+    each beside 200 points: 0.1 * 10 / 210 = 0.005, doubled by their larger votes.
     """
     X = np.concatenate([floor(200), cloud(200)])
     got = found(X, tolerance=0.1)
@@ -48,7 +48,7 @@ def test_a_plane_among_as_many_other_points_is_found_with_its_frame() -> None:
 
 
 def test_without_other_points_it_is_the_plane_of_least_squares() -> None:
-    """Oracle: the smallest eigenvector of their covariance.  Each point has a cell, and a vote, of its own."""
+    """Oracle: the smallest eigenvector of their covariance.  Each point has a cell and a vote."""
     X = floor(60, noise=0.001)
     got = found(X, tolerance=0.01)
     assert len(np.unique(np.floor(X / 0.02), axis=0)) == 60
@@ -87,7 +87,7 @@ def test_the_larger_of_two_planes_wins() -> None:
 
 
 def test_a_wide_plane_wins_over_one_through_three_clumps_with_more_points() -> None:
-    """What a map of textured things looks like: 3 x 150 points in clumps of 0.02, 150 of a plane 4 x 4 wide."""
+    """Textured things and a floor: 3 x 150 points in clumps of 0.02, and 150 in a plane 4 wide."""
     rng = np.random.default_rng(2)
     clumps = np.repeat([[2.0, 0, 1], [-1, 1, 2], [0, -2, 5]], 150, axis=0) + 0.02 * rng.normal(size=(450, 3))
     got = found(np.concatenate([floor(150, noise=0.01), clumps]), tolerance=0.05)

@@ -35,4 +35,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Hand over to the family of the system."""
     family = next(family for family in FAMILIES if options.system in family.SYSTEMS)
-    return family.run(options)
+    status: int = family.run(options)
+    return status

@@ -33,11 +33,13 @@ the name of a data set that VSLAM_REF_DATA finds. Where no camera lies beside th
 camera file that this library reads, or one line 'fx fy cx cy width height'.
 
 numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final
-and the live path after alignment by a similarity (null without truth); scale_drift, the scale of the last third
-of the path over that of the first (below 1: the map grew); pictures a second without reading and drawing.
+and the live path after alignment by a similarity (null without truth); scale_drift, the scale that brings the
+last third of the path to the truth over that of the first (below 1: the map grew); pictures a second without
+reading and drawing.
 
 Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
-A scene that allows no start ends with status 0 and the reason. '--set tracker.fine_points=500' changes a setting."""
+A scene that allows no start ends with status 0 and the reason.
+'--set tracker.fine_points=500' changes a setting."""
 EXAMPLES = """\
 examples with your own pictures:
   vslam-ref run ptam walk.mp4 --camera camera.yaml --out out/walk

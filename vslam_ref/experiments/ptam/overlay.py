@@ -1,4 +1,4 @@
-"""The film of a run: the pictures with what was tracked in them, a grid on the dominant plane, and a house on it.
+"""The film of a run: its pictures with what was tracked, a grid on the dominant plane, and a house on it.
 
 It is drawn when the run has ended, with the final poses, so the pictures between the two of the start have
 theirs, too.

@@ -43,7 +43,7 @@ def dots(image: Bytes, uv: Array, colour: Colour, radius: float, cover: float = 
 
 
 def lines(image: Bytes, ends: Array, colour: Colour, radius: float, cover: float = 1.0) -> None:
-    """Paint line segments with ``ends`` (n, 2, 2), each from one point to another, ``radius`` half their width.
+    """Paint line segments from ``ends[:, 0]`` to ``ends[:, 1]``, (n, 2, 2); ``radius`` is half their width.
 
     Segments with an end farther outside than the picture is large are left out.
     """

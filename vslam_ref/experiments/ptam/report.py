@@ -44,10 +44,10 @@ from vslam_ref.systems.visual_map.adjust import as_problem
 FILM = "overlay.webm"
 FILES = ("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", FILM, "result.json")
 LEGEND = (
-    "Points that were tracked: vermilion, yellow, sky blue, blue (and larger) on levels 0, 1, 2, 3 of the pyramid; "
-    "green lines before the start: how corners moved. White: a grid on the dominant plane of the map, on which a "
-    "house stands. The strip at the bottom: grey without a map, green at the start, then blue good, orange poor, "
-    "vermilion lost."
+    "Points that were tracked: vermilion, yellow, sky blue, blue (and larger) on levels 0, 1, 2, 3 of the "
+    "pyramid; green lines before the start: how corners moved. White: a grid on the dominant plane of the "
+    "map, on which a house stands. The strip at the bottom: grey without a map, green at the start, then "
+    "blue good, orange poor, vermilion lost."
 )
 
 

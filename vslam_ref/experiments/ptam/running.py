@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
 from vslam_ref.systems.ptam.ptam import Outcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
@@ -233,10 +233,11 @@ def _waited(done: Run, frame: Frame, outcome: Outcome) -> Frame:
     return frame._replace(tried=len(trails.now), marks=marks)
 
 
-def path(run: Run, live: bool = False) -> tuple[Array, Array]:
-    """Numbers (n,) of pictures with a pose, and ``T_cam_world`` (n, 4, 4); ``live``: as they were told then."""
+def path(run: Run, live: bool = False) -> tuple[IntArray, Array]:
+    """Numbers (n,) of pictures with a pose, and ``T_cam_world`` (n, 4, 4); ``live``: as they were told."""
     if not live:
-        return run.system.trajectory()
+        numbers, T = run.system.trajectory()
+        return numbers.astype(np.int64), T
     told = [pose for _, pose in sorted(run.system.poses.items()) if pose.live is not None]
     T = np.stack([pose.live for pose in told if pose.live is not None]) if told else np.zeros((0, 4, 4))
     return np.array([pose.number for pose in told], np.int64), T

@@ -32,7 +32,7 @@ class Face(NamedTuple):
 
 
 def grid(cell: float) -> Array:
-    """Lines of a grid around the plane's middle, cut into pieces: their ends, (n, 2, 3)."""
+    """Lines of a grid around the plane's origin, cut into pieces: their ends, (n, 2, 3)."""
     reach = CELLS // 2
     along = np.linspace(-reach, reach, CELLS * PIECES + 1) * cell
     across = np.arange(-reach, reach + 1) * cell
@@ -43,7 +43,7 @@ def grid(cell: float) -> Array:
 
 
 def house(cell: float) -> tuple[Face, ...]:
-    """A convex house around the plane's middle: four walls, two of them with a gable, and two sides of a roof."""
+    """A convex house around the plane's origin: four walls, two of them gables, and two sides of a roof."""
     w, d, h, top = (v * cell for v in (WIDTH / 2, DEPTH / 2, WALL, ROOF))
     low = np.array([[-w, -d, 0], [w, -d, 0], [w, d, 0], [-w, d, 0]])
     high = low + [0, 0, h]
@@ -82,10 +82,11 @@ class View(NamedTuple):
         return np.asarray(se3.inverse(self.T_cam_plane)[:3, 3])
 
     def pixels(self, X: Array) -> tuple[Array, BoolArray]:
-        """Pixels (..., 2) of points (..., 3) of the plane's frame, and whether the lens shows them near the picture."""
+        """Pixels (..., 2) of points (..., 3) of the plane's frame, and which are in or near the picture."""
         X_cam = se3.act(self.T_cam_plane, X)
         width, height = self.size
-        border = self.camera.unproject([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+        corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], dtype=np.float64)
+        border = self.camera.unproject(corners)
         inside = X_cam[..., 2] > 0
         if border.valid.all():
             reach = BEYOND * np.abs(border.xn).max()

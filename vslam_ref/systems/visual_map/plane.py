@@ -1,12 +1,13 @@
 r"""The plane that fills most of a map: a floor, a table, a wall.
 
-With :math:`d_j = n^T X_j - h` the distance of a point from a plane, samples of three points compete for the least
+With :math:`d_j = n^T X_j - h` the distance of a point from a plane, samples of three points compete for the
+least
 
 .. math:: \sum_j w_j \min(d_j^2,\; c^2)
 
-(MSAC), and the winner is fitted by weighted least squares to the points within c, anew until these stay the same.
-Neither step can raise the sum: the best plane of the points within c lowers their part, and a point that
-then leaves or comes in lowers its own.
+(MSAC), and the winner is fitted by weighted least squares to the points within c, anew until these stay the
+same.  Neither step can raise the sum: the best plane of the points within c lowers their part, and a point
+that then leaves or comes in lowers its own.
 
 A plane is wide; a textured thing is a clump of points, and through any three clumps there is a plane.  So
 points share a vote with all others of their cell, a cube with side 2 c: :math:`w_j` is one over their number.
@@ -44,9 +45,9 @@ class Plane(NamedTuple):
     Attributes
     ----------
     T_plane_world : ndarray, shape (4, 4)
-        The plane is z = 0, its origin the (weighted) mean of the points in it.  The z axis points to the side of the
-        world's origin (of the first camera, in a map); the x axis is the world's x axis laid into the plane, or
-        its z axis where the plane stands across x.
+        The plane is z = 0, its origin the (weighted) mean of the points in it.  The z axis points to the
+        side of the world's origin (of the first camera, in a map); the x axis is the world's x axis laid into
+        the plane, or its z axis where the plane stands across x.
     inliers : ndarray of bool, shape (N,)
         Points in it.
     reason : str
@@ -179,7 +180,7 @@ def _within(X: Array, n: Array, h: float, c: float) -> BoolArray:
 
 
 def _fitted(X: Array, vote: Array) -> tuple[Array, float]:
-    """Plane with the least weighted sum of squared distances: through the mean, across the least direction."""
+    """Plane with the least weighted sum of squares: through the mean, across the least direction."""
     middle = np.average(X, 0, vote)
     n = np.linalg.svd(np.sqrt(vote)[:, None] * (X - middle), full_matrices=False)[2][2]
     return n, float(n @ middle)
