@@ -1,7 +1,7 @@
 """A world that is quick to draw: boards with a random texture before a wall, and a camera that passes by.
 
-Pictures are 320 x 240.  A board is a rectangle of a plane z = depth; textures are smooth noise, so corners stay
-where they are.  The truth is exact.
+Pictures are 320 x 240.  A board is a rectangle of a plane z = depth; textures are smooth noise, so that
+corners stay where they are.  The truth is exact.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def test_no_start_is_told_with_its_reason(
     assert f"note: no start: {reason}" in capsys.readouterr().out
     assert reason in (tmp_path / "out" / "report.html").read_text()
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"result.json", "report.html", "course.png", "course.svg", "overlay.webm"}
+    assert names == {"result.json", "report.html", "course.png", "overlay.webm"}
 
 
 def test_one_picture_and_none_that_can_be_read(run: Callable[..., int], tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ KEYS = {
 }
 FILES = {
     *("result.json", "report.html", "trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply"),
-    *("overlay.webm", "map.png", "map.svg", "course.png", "course.svg"),
+    *("overlay.webm", "map.png", "course.png"),
 }
 
 

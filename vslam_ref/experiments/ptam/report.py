@@ -8,8 +8,8 @@
     OUT/keyframes.txt             TUM: the keyframes
     OUT/map.ply                   points in the grey of their pictures, keyframes as pyramids
     OUT/overlay.webm              the pictures with what was tracked, a grid on the plane, a house on it
-    OUT/map.png, .svg             the map and the path from three sides
-    OUT/course.png, .svg          tracking over the pictures
+    OUT/map.png                   the map and the path from three sides
+    OUT/course.png                tracking over the pictures
     OUT/report.html               the page
 
 Without a start there are no paths and no map.  Poses are ``T_world_cam``; the world is the camera's frame at
@@ -62,8 +62,7 @@ def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
         final = accuracy(run.sequence, *path(run))
         figures = {"map": map_figure(scene(run, visual_map, final), title), **figures}
     for name, figure in figures.items():
-        for suffix in ("png", "svg"):
-            (folder / f"{name}.{suffix}").write_bytes(figure_bytes(figure, suffix, "ptam"))
+        (folder / f"{name}.png").write_bytes(figure_bytes(figure, "png", "ptam"))
     write_text(folder / "result.json", to_json(content))
     write_text(folder / "report.html", page(folder, run, content, title, tuple(figures)))
 

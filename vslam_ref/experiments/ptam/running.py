@@ -175,7 +175,7 @@ def _one(done: Run, image: Image) -> Frame:
     """Give one picture to the system."""
     if image.grey is None:
         return Frame(image.number, image.time, UNUSABLE)
-    had_map = done.system.map is not None
+    had_map, before = done.system.map is not None, done.system.trails
     began = time.perf_counter()
     outcome = done.system.step(image.number, image.grey)
     seconds = time.perf_counter() - began
@@ -185,7 +185,7 @@ def _one(done: Run, image: Image) -> Frame:
     if not had_map and done.system.map is not None and isinstance(outcome.attempt, Attempt):
         done.start = outcome.attempt
         return frame._replace(state=START, keyframe=True, marks=_start_marks(outcome.attempt))
-    return _waited(done, frame, outcome)
+    return _waited(done, frame, outcome, 0 if before is None else len(before.pictures))
 
 
 def _tracked(frame: Frame, outcome: Outcome, tracked: Tracked) -> Frame:
@@ -212,8 +212,8 @@ def _start_marks(attempt: Attempt) -> Marks:
     return Marks(uv, attempt.level[good].astype(np.uint8), first)
 
 
-def _waited(done: Run, frame: Frame, outcome: Outcome) -> Frame:
-    """No map yet: note the reason, and the trails to be drawn."""
+def _waited(done: Run, frame: Frame, outcome: Outcome, before: int) -> Frame:
+    """No map yet: note the reason, and the trails to be drawn; ``before`` is over how many pictures they ran."""
     trails, start = done.system.trails, done.settings.start
     if isinstance(outcome.attempt, Attempt):
         done.refused(outcome.attempt.reason)
@@ -223,6 +223,8 @@ def _waited(done: Run, frame: Frame, outcome: Outcome) -> Frame:
         count = 0 if trails is None else len(trails.now)
         if count < start.least_trails:
             done.refused(f"{count} corners in a picture: need {start.least_trails}")
+        elif 0 < before < start.patience:
+            done.refused("too few corners were found again in the next picture: begun anew")
         return frame
     if outcome.attempt is None:
         moved = f"corners moved by {trails.length:.2f} px (median)"
