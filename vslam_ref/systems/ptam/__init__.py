@@ -1,0 +1,24 @@
+"""PTAM: a camera is tracked while a map is made of what it sees.
+
+==================  ==============================================================================
+module              holds
+==================  ==============================================================================
+``ptam``            :class:`Ptam`: a picture in, a pose out, in a fixed order
+``settings``        every number and its reason
+``look``            pyramid and corners of a picture
+``trails``          before there is a map: corners followed from picture to picture
+``start``           two pictures to a first map, or why not yet
+``tracker``         the pose of every picture
+``policy``          which pictures become keyframes
+``mapper``          what happens to these
+==================  ==============================================================================
+
+A system takes pictures; it opens no files and draws nothing.
+"""
+
+from vslam_ref.systems.ptam.ptam import Outcome, Pose, Ptam
+from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.ptam.tracker.quality import Quality
+from vslam_ref.systems.ptam.tracker.tracker import Tracked
+
+__all__ = ["Outcome", "Pose", "Ptam", "Quality", "Settings", "Tracked"]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features import corner_score, detect, is_peak, pyramid, shi_tomasi, small_image
 from vslam_ref.features.corners import HALF
+from vslam_ref.features.fast import Pixels
 from vslam_ref.features.small_images import LEAST_SIDE
 from vslam_ref.systems.ptam.settings import FeatureSettings
 from vslam_ref.systems.visual_map import Picture
@@ -18,11 +19,11 @@ def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Picture:
     levels = pyramid(grey, settings.levels)
     limit = [settings.threshold_finest] + [settings.threshold] * (settings.levels - 1)
     corners = tuple(detect(image, t, settings.arc) for image, t in zip(levels, limit, strict=True))
-    coarse = max(l for l, image in enumerate(levels) if l == 0 or min(image.shape) >= LEAST_SIDE)
+    coarse = max(k for k, image in enumerate(levels) if k == 0 or min(image.shape) >= LEAST_SIDE)
     return Picture(number, levels, corners, small_image(levels[coarse], coarse))
 
 
-def peaks(picture: Picture, level: int, settings: FeatureSettings) -> IntArray:
+def peaks(picture: Picture, level: int, settings: FeatureSettings) -> Pixels:
     """Pixels (n, 2) of a level's corners that are stronger than their neighbours."""
     corners = picture.corners[level]
     score = corner_score(picture.levels[level], corners.xy, settings.arc)
@@ -43,7 +44,7 @@ def strong_corners(picture: Picture, level: int, settings: FeatureSettings) -> I
     return strong
 
 
-def spread(xy: IntArray, shape: tuple[int, ...], count: int) -> IntArray:
+def spread(xy: Pixels, shape: tuple[int, ...], count: int) -> IntArray:
     """Rows of at most ``count`` points, strongest first, so that all parts of a picture have their share."""
     side = max(int(np.ceil(np.sqrt(shape[0] * shape[1] / max(count, 1) * 3.0))), 8)
     cell = xy[:, 1] // side * (shape[1] // side + 1) + xy[:, 0] // side

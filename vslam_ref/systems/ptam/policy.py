@@ -1,4 +1,4 @@
-"""When does a picture become a keyframe?"""
+"""Which pictures become keyframes."""
 
 from __future__ import annotations
 

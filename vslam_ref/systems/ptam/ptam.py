@@ -32,7 +32,7 @@ from vslam_ref.systems.visual_map import Picture, VisualMap
 
 
 class Pose(NamedTuple):
-    """Where a picture was taken, relative to a keyframe: ``T_cam_kf`` (4, 4); ``live`` as it was told then."""
+    """Pose of a picture relative to a keyframe, ``T_cam_kf`` (4, 4), and ``live``, as it was told then."""
 
     number: int
     kf: int
@@ -101,7 +101,7 @@ class Ptam:
             self.trails = trail_steps.begin(picture, s, f)
             return Outcome(picture.number)
         assert self.trails is not None
-        if self.trails.length < s.least_motion:
+        if self.trails.length < s.least_motion or len(self.trails.pictures) <= s.least_pictures:
             return Outcome(picture.number)
         found = attempt(self.camera, self.trails, s, self.rng)
         if isinstance(found, str):
@@ -136,7 +136,8 @@ class Ptam:
     # --- with a map ---------------------------------------------------------------------------
 
     def _with_the_map(self, picture: Picture) -> Outcome:
-        assert self.map is not None and self.tracker is not None
+        assert self.map is not None
+        assert self.tracker is not None
         tracked = self.tracker.track(self.map, picture)
         mapped = None
         if tracked.quality is not Quality.LOST:
@@ -164,7 +165,8 @@ class Ptam:
         self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
 
     def _keyframe(self, picture: Picture, tracked: Tracked) -> Mapped:
-        assert self.map is not None and self.tracker is not None
+        assert self.map is not None
+        assert self.tracker is not None
         held = tracked.fine.weights > 0
         seen = tracked.fine.seen
         measured = Measurements(seen.point[held], tracked.fine.uv[held], seen.level[held])

@@ -15,7 +15,11 @@ class FeatureSettings:
     arc: int = assume(10, "pixels of 16", "PTAM's FAST-10")
     threshold: int = assume(10, "grey levels", "PTAM's, of all levels but the finest")
     threshold_finest: int = assume(10, "grey levels", "PTAM's")
-    least_eigenvalue: float = assume(10.0, "grey levels^2 / px^2", "PTAM's 70 halves to 35 in this unit and depends on exposure; 20 halved keeps twice the corners")
+    least_eigenvalue: float = assume(
+        10.0,
+        "grey levels^2 / px^2",
+        "PTAM's 70 halves to 35 in this unit and depends on exposure; 20 halved keeps twice the corners",
+    )
     limit: float = assume(0.5, "share of the template's variation", "an absolute limit depends on contrast")
     absolute: float = assume(0.0, "grey levels^2", "0: the relative limit; PTAM has an absolute one")
     measure: str = assume("zmssd", "", "PTAM's; zncc is the other")
@@ -30,14 +34,21 @@ class StartSettings:
     least_trails: int = assume(80, "points", "fewer: the trails begin anew")
     search_radius: float = assume(12.0, "px", "from picture to picture, around where it was going")
     least_motion: float = assume(8.0, "px", "median length of the trails before a start is tried")
+    least_pictures: int = assume(
+        6, "pictures", "a rolling shutter makes parallax out of a quick turn; the true one grows with time"
+    )
     parallax: float = assume(0.7, "degrees", "median; forward motion never reaches 1.5")
     wide_parallax: float = assume(1.0, "degrees", "of the points that make the map")
     wide_points: int = assume(45, "points", "with that parallax at least")
     cost: float = assume(0.25, "px^2 per point", "Sampson distance squared, of inliers and outliers alike")
-    depth_spread: float = assume(1.25, "ratio of the 90 % to the 10 % depth", "one depth is a plane: nothing is known")
+    depth_spread: float = assume(
+        1.25, "ratio of the 90 % to the 10 % depth", "one depth is a plane: nothing is known"
+    )
     rival: float = assume(1.5, "ratio of costs", "another answer that is nearly as good: refused")
     rival_offset: float = assume(0.01, "px^2 per point", "added, since costs near zero have no ratio")
-    keep: float = assume(0.6, "share", "of the trails that must survive following from the first picture again")
+    keep: float = assume(
+        0.6, "share", "of the trails that must survive following from the first picture again"
+    )
     patience: int = assume(60, "pictures", "the trails begin anew after so many")
 
 
@@ -49,7 +60,9 @@ class TrackerSettings:
     coarse_least: int = assume(15, "points", "fewer found: the next guess is tried")
     coarse_agree: float = assume(0.4, "share", "of the coarse points found: the guess was good")
     fine_points: int = assume(1000, "points", "PTAM's")
-    radius: tuple[float, ...] = assume((10.0, 20.0, 40.0), "px", "constant velocity; small image; small image, wide")
+    radius: tuple[float, ...] = assume(
+        (10.0, 20.0, 40.0), "px", "constant velocity; small image; small image, wide"
+    )
     fine_radius: float = assume(5.0, "px", "after the coarse pass")
     steps: int = assume(10, "", "PTAM's reweighted steps")
     loss: str = assume("tukey", "", "PTAM's; l2 and huber for comparison")
@@ -84,7 +97,11 @@ class MapperSettings:
 
     look_radius: float = assume(4.0, "px", "looking again with a known pose")
     epipolar: float = assume(2.0, "px of the level", "corners so near to the curve are compared")
-    back: float = assume(1.5, "px of the level", "the way back must end there; a wrong match on the line fits two views exactly")
+    back: float = assume(
+        1.5,
+        "px of the level",
+        "the way back must end there; a wrong match on the line fits two views exactly",
+    )
     search_back: bool = assume(True, "", "as above")
     spacing: float = assume(10.0, "px of the level", "from points that are measured already")
     parallax: float = assume(1.0, "degrees", "of new points; forward motion needs it so small")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.estimation.relative_pose import estimate_motion
+from vslam_ref.estimation.relative_pose import MotionEstimate, estimate_motion
 from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.features import level_sigma
 from vslam_ref.geometry import se3
@@ -18,6 +18,9 @@ from vslam_ref.systems.ptam.mapper.new_points import new_points
 from vslam_ref.systems.ptam.settings import Settings, StartSettings
 from vslam_ref.systems.ptam.trails import Trails, from_the_first
 from vslam_ref.systems.visual_map import VisualMap
+
+WORST_PIXELS = 3.0
+"""Pixels of the level: root mean square distance of a point of the first map from its two sightings."""
 
 
 class Attempt(NamedTuple):
@@ -50,7 +53,7 @@ class Attempt(NamedTuple):
     T_b_a: Array
     uv_a: Array
     uv_b: Array
-    level: Array
+    level: IntArray
     good: BoolArray
     X_a: Array
     cost: float
@@ -68,38 +71,60 @@ def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Gen
     if ok.sum() < max(s.least_trails, 8):
         return f"{ok.sum()} of {len(ok)} corners are still found: need {s.least_trails}"
     uv_a, uv_b, level = trails.first[ok], again[ok], trails.level[ok]
-    a, b = camera.unproject(uv_a), camera.unproject(uv_b)
-    sigma = 1.0 / float(np.sqrt(camera.fx * camera.fy))
-    found = estimate_motion(a.xn, b.xn, rng, sigma=sigma)
-    return _judged(camera, found, uv_a, uv_b, level, s)._replace(row=np.flatnonzero(ok))
+    a, b = camera.unproject(uv_a).xn, camera.unproject(uv_b).xn
+    found = estimate_motion(a, b, rng, sigma=1.0 / float(np.sqrt(camera.fx * camera.fy)))
+    return _judged(camera, found, Pair(uv_a, uv_b, level, np.flatnonzero(ok)), s)
 
 
-def _judged(camera, found, uv_a, uv_b, level, s):  # type: ignore[no-untyped-def]
+class Pair(NamedTuple):
+    """Matches of two pictures: pixels of level 0 (n, 2), levels (n,), numbers of the trails (n,)."""
+
+    uv_a: Array
+    uv_b: Array
+    level: IntArray
+    row: IntArray
+
+
+def _judged(camera: Camera, found: MotionEstimate, pair: Pair, s: StartSettings) -> Attempt:
     """Triangulate, and say what is missing for a start."""
-    T, choice = found.T_b_a, found.choice
+    choice = found.choice
     cost, rivals = (choice.cost, choice.rivals) if choice is not None else (np.inf, ())
-    views = Views(camera, [se3.identity(), T])
-    points = triangulate(views, np.stack([uv_a, uv_b], 1), min_parallax=0.0, max_iterations=10)
-    small = points.rmse_px <= 3.0 * level_sigma(level)
-    good = found.inliers & points.ok & small
-    angle = np.degrees(points.parallax[found.inliers & small])
-    parallax = float(np.median(angle)) if len(angle) else 0.0
-    wide = int((angle >= s.wide_parallax).sum())
-    good &= np.degrees(points.parallax) >= 0.5 * s.parallax
-    depth = points.X_world[good, 2]
-    spread = float(np.percentile(depth, 90) / np.percentile(depth, 10)) if good.sum() > 10 else 1.0
-    reason = found.reason
-    if not reason and parallax < s.parallax:
-        reason = f"the rays of a point differ by {parallax:.2f} degrees: need {s.parallax:g}"
-    if not reason and wide < s.wide_points:
-        reason = f"{wide} points have {s.wide_parallax:g} degrees of parallax: need {s.wide_points}"
-    if not reason and cost > s.cost:
-        reason = f"the cost is {cost:.2f} px^2 a point: at most {s.cost:g}"
-    if not reason and spread < s.depth_spread:
-        reason = f"depths differ by a factor of {spread:.2f}: need {s.depth_spread:g}"
+    views = Views(camera, np.stack([se3.identity(), found.T_b_a]))
+    points = triangulate(views, np.stack([pair.uv_a, pair.uv_b], 1), min_parallax=0.0, max_iterations=10)
+    fits = found.inliers & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
+    angle = np.degrees(points.parallax)
+    good = fits & points.ok & (angle >= 0.5 * s.parallax)
+    parallax = float(np.median(angle[fits])) if fits.any() else 0.0
+    wide = int((angle[fits] >= s.wide_parallax).sum())
+    reason = found.reason or _missing(parallax, wide, cost, points.X_world[good, 2], s)
     return Attempt(
-        T, uv_a, uv_b, level, good, points.X_world, cost, rivals, parallax, reason, np.arange(len(uv_a)), found.inliers
+        found.T_b_a,
+        pair.uv_a,
+        pair.uv_b,
+        pair.level,
+        good,
+        points.X_world,
+        float(cost),
+        rivals,
+        parallax,
+        reason,
+        pair.row,
+        found.inliers,
     )
+
+
+def _missing(parallax: float, wide: int, cost: float, depth: Array, s: StartSettings) -> str:
+    """Why a motion is no start, or nothing."""
+    if parallax < s.parallax:
+        return f"the rays of a point differ by {parallax:.2f} degrees: need {s.parallax:g}"
+    if wide < s.wide_points:
+        return f"{wide} points have {s.wide_parallax:g} degrees of parallax: need {s.wide_points}"
+    if cost > s.cost:
+        return f"the cost is {cost:.2f} px^2 a point: at most {s.cost:g}"
+    spread = float(np.percentile(depth, 90) / np.percentile(depth, 10)) if len(depth) > 10 else 1.0
+    if spread < s.depth_spread:
+        return f"depths differ by a factor of {spread:.2f}: need {s.depth_spread:g}"
+    return ""
 
 
 def first_map(camera: Camera, trails: Trails, found: Attempt, settings: Settings) -> VisualMap:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
 from vslam_ref.systems.ptam.look import spread, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings, StartSettings
@@ -85,7 +85,7 @@ def from_the_first(trails: Trails, s: StartSettings) -> Array:
 
 def _followed(
     a: Picture, b: Picture, level: IntArray, uv: Array, guess: Array, radius: float
-) -> tuple[Array, Array]:
+) -> tuple[Array, BoolArray]:
     place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
     for each in LEVELS:
         rows = np.flatnonzero(level == each)

@@ -109,10 +109,8 @@ def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,)) -> _Whole:
 
 
 def local_active(visual_map: VisualMap, newest: int, count: int) -> IntArray:
-    """Return the newest keyframe and its ``count`` best connected ones; never keyframe 0, which holds the map."""
+    """Return the newest keyframe and its ``count`` best connected ones, without keyframe 0, which stays."""
     from vslam_ref.systems.visual_map.visual_map import neighbours
 
     chosen = np.concatenate([[newest], neighbours(visual_map, newest, count)])
     return np.asarray(chosen[chosen != 0], dtype=np.int64)
-
-

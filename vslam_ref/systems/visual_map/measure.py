@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.features import (
     Corners,
     Templates,
@@ -48,6 +48,9 @@ class Looks(NamedTuple):
     first_refine: bool = True
 
 
+PLAIN = Looks()
+
+
 class Measured(NamedTuple):
     """Places (n, 2), pixels of level 0, and which were found (n,)."""
 
@@ -56,7 +59,7 @@ class Measured(NamedTuple):
 
 
 def look(
-    visual_map: VisualMap, seen: Visible, picture: Picture, radius: ArrayLike, looks: Looks = Looks()
+    visual_map: VisualMap, seen: Visible, picture: Picture, radius: ArrayLike, looks: Looks = PLAIN
 ) -> Measured:
     """Look for visible points in a picture.
 
@@ -97,7 +100,7 @@ def look(
 
 
 def locate(
-    image: Bytes, corners: Corners, patches: Templates, uv: Array, radius: Array, looks: Looks = Looks()
+    image: Bytes, corners: Corners, patches: Templates, uv: Array, radius: Array, looks: Looks = PLAIN
 ) -> Measured:
     """Look for patches on one level, all in that level's pixels."""
     patch = patches.patch
@@ -111,7 +114,9 @@ def locate(
         place[ok] = direct.uv[ok]
     left = np.flatnonzero(~ok)
     limit = looks.limit if not looks.absolute else looks.absolute / np.maximum(spread[left], 1.0)
-    by_corner = search(image, corners, patch[left], uv[left], radius[left], limit=limit, measure=looks.measure)
+    by_corner = search(
+        image, corners, patch[left], uv[left], radius[left], limit=limit, measure=looks.measure
+    )
     have = np.flatnonzero(by_corner.corner >= 0)
     start = corners.xy[by_corner.corner[have]].astype(np.float64)
     end, rows = refine(image, patch[left[have]], start), left[have]

@@ -1,7 +1,7 @@
 r"""Which points of the map a camera should see, where, how large, and how turned.
 
-Around a point the surface is taken for a plane across the axis of the keyframe in which it was first seen.  One
-pixel there moves the point by :math:`Z_s\, \mathrm{d}x_n/\mathrm{d}u_s` in that plane, so
+Around a point the surface is taken for a plane across the axis of the keyframe in which it was first seen.
+One pixel there moves the point by :math:`Z_s\, \mathrm{d}x_n/\mathrm{d}u_s` in that plane, so
 
 .. math:: A = \frac{\partial u}{\partial X_{cam}}\; R_{cam\,s}
    \begin{bmatrix} 1 & 0 \\ 0 & 1 \\ 0 & 0 \end{bmatrix} Z_s \frac{\partial x_n}{\partial u_s} .
@@ -18,14 +18,14 @@ from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 from vslam_ref.features import Templates, level_from_finest, level_sigma, sampling, search_level, warp
 from vslam_ref.features.templates import AFTER, BEFORE
 from vslam_ref.geometry import se3
-from vslam_ref.systems.visual_map.visual_map import VisualMap
+from vslam_ref.systems.visual_map.visual_map import Rowlike, VisualMap
 
 MARGIN = 5.0
 """Pixels of the level on which a point is looked for, that it must keep from the border."""
 
 
 class Sources(NamedTuple):
-    """Where points were first seen: keyframe, level, pixel of level 0 (n, 2), d xn / d pixel (n, 2, 2), depth."""
+    """Where points were first seen: keyframe, level, pixel (n, 2), d xn / d pixel (n, 2, 2), depth."""
 
     kf: IntArray
     level: IntArray
@@ -67,9 +67,9 @@ class Visible(NamedTuple):
     A: Array
     level: IntArray
 
-    def only(self, rows: ArrayLike) -> Visible:
+    def only(self, rows: Rowlike) -> Visible:
         """Return those of a mask, or of row numbers."""
-        return Visible(*(values[rows] for values in self))
+        return Visible(self.point[rows], self.uv[rows], self.depth[rows], self.A[rows], self.level[rows])
 
 
 def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | None = None) -> Visible:
@@ -94,7 +94,7 @@ def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | N
     number, X_cam = _roughly_inside(visual_map, number, X_cam)
     at = visual_map.camera.project_with_jacobians(X_cam)
     inside = (at.uv >= 0).all(1) & (at.uv <= (width - 1, height - 1)).all(1) & at.valid
-    number, X_cam, uv, J = (a[inside] for a in (number, X_cam, at.uv, at.J_point))
+    number, X_cam, uv, J = number[inside], X_cam[inside], at.uv[inside], at.J_point[inside]
     origin = sources(visual_map, number)
     A = affine(visual_map, origin, T, J)
     level = search_level(A * level_sigma(origin.level)[:, None, None], visual_map.levels)
@@ -107,7 +107,7 @@ def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | N
 def _roughly_inside(visual_map: VisualMap, number: IntArray, X_cam: Array) -> tuple[IntArray, Array]:
     """Leave out what is behind the camera or far outside its field, before the lens is asked."""
     camera, (height, width) = visual_map.camera, visual_map.shape
-    border = camera.unproject([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+    border = camera.unproject(np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64))
     if not border.valid.all():
         return number, X_cam
     reach = 1.5 * np.abs(border.xn).max()
@@ -138,7 +138,9 @@ def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray)
             continue
         images = visual_map.image(each)
         height, width = images.shape[1:]
-        above = np.stack([np.zeros(len(rows)), origin.kf[rows] * float(height)], 1)  # images lie in one column
+        above = np.stack(
+            [np.zeros(len(rows)), origin.kf[rows] * float(height)], 1
+        )  # images lie in one column
         found = warp(images.reshape(-1, width), at[rows] + above, M[rows])
         patch[rows], inside[rows] = found.patch, found.inside & _whole(at[rows], M[rows], height)
     return Templates(patch, inside)

@@ -17,9 +17,8 @@ when fewer than two sightings are left.  Nothing here finds anything in an image
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +29,8 @@ from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.visual_map.rows import Rows
 
 Bytes = NDArray[np.uint8]
+Rowlike = NDArray[Any]
+"""Numbers of rows, or a mask of all."""
 
 
 class Picture(NamedTuple):
@@ -72,7 +73,11 @@ def _points() -> Rows:
 
 def _sightings() -> Rows:
     return Rows(
-        kf=((), np.int64), point=((), np.int64), level=((), np.int64), uv=((2,), np.float64), on=((), np.bool_)
+        kf=((), np.int64),
+        point=((), np.int64),
+        level=((), np.int64),
+        uv=((2,), np.float64),
+        on=((), np.bool_),
     )
 
 
@@ -181,7 +186,7 @@ class VisualMap:
         at = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
         return self.sightings.append(len(numbers), kf=kf, point=numbers, level=level, uv=at, on=True)
 
-    def take_back(self, sightings: ArrayLike) -> IntArray:
+    def take_back(self, sightings: Rowlike) -> IntArray:
         """Take sightings back (numbers, or a mask of all); return the points (n,) that die of it."""
         seen, points = self.sightings, self.points
         seen["on"][sightings] = False
@@ -194,7 +199,7 @@ class VisualMap:
         self.remove(dead)
         return dead
 
-    def remove(self, points: ArrayLike) -> None:
+    def remove(self, points: Rowlike) -> None:
         """Let points die, with all their sightings."""
         alive = self.points["alive"]
         alive[points] = False
@@ -224,7 +229,7 @@ class VisualMap:
 
 
 def slopes(camera: Camera, uv: ArrayLike) -> Array:
-    """d xn / d uv (..., 2, 2) at pixels (..., 2): how a plane across the axis runs under the pixels.
+    """Slope d xn / d uv (..., 2, 2) at pixels (..., 2): how a plane across the axis runs under the pixels.
 
     Examples
     --------
@@ -248,9 +253,9 @@ def shared_points(visual_map: VisualMap) -> IntArray:
     return counts
 
 
-def neighbours(visual_map: VisualMap, kf: int, count: int, among: Sequence[int] | None = None) -> IntArray:
+def neighbours(visual_map: VisualMap, kf: int, count: int) -> IntArray:
     """Keyframes (at most ``count``) that share most points with ``kf``, most first; without ``kf`` itself."""
     shared = shared_points(visual_map)[kf].copy()
     shared[kf] = 0
     order = np.argsort(-shared, kind="stable")[:count]
-    return order[shared[order] > 0]
+    return np.asarray(order[shared[order] > 0])

@@ -16,6 +16,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import finest_from_level, level_sigma, zmssd
+from vslam_ref.features.fast import Pixels
 from vslam_ref.features.patch_search import AREA, variation
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import se3, so3
@@ -29,14 +30,14 @@ PORTION = 4096
 class Corner(NamedTuple):
     """Whole pixels of a level (n, 2), their bearings (n, 3) and d bearing / d pixel of level 0 (n, 3, 2)."""
 
-    xy: IntArray
+    xy: Pixels
     bearing: Array
     J_pixel: Array
     valid: BoolArray
 
     def only(self, rows: IntArray) -> Corner:
         """Return some of them."""
-        return Corner(*(values[rows] for values in self))
+        return Corner(self.xy[rows], self.bearing[rows], self.J_pixel[rows], self.valid[rows])
 
 
 class OnCurve(NamedTuple):
@@ -46,7 +47,7 @@ class OnCurve(NamedTuple):
     cost: Array
 
 
-def with_bearings(camera: Camera, xy: IntArray, level: int) -> Corner:
+def with_bearings(camera: Camera, xy: Pixels, level: int) -> Corner:
     """Give corners of a level their rays."""
     ray = camera.unproject_with_jacobians(finest_from_level(xy, level))
     return Corner(xy, ray.bearing, ray.J_pixel, ray.valid)
@@ -57,18 +58,16 @@ def essential(T_b_a: Array) -> Array:
     return so3.hat(se3.translation(T_b_a)) @ se3.rotation(T_b_a)
 
 
-def search_curve(
-    patch: Bytes,
-    a: Corner,
-    image: Bytes,
-    b: Corner,
-    T_b_a: Array,
-    *,
-    level: int,
-    near: float,
-    distance: float,
-    limit: float,
-) -> OnCurve:
+class Gates(NamedTuple):
+    """What a match must pass: level, least depth, pixels from the curve, share of the variation."""
+
+    level: int
+    near: float
+    distance: float
+    limit: float
+
+
+def search_curve(patch: Bytes, a: Corner, image: Bytes, b: Corner, T_b_a: Array, gates: Gates) -> OnCurve:
     """Find for each patch the corner near its curve that looks most like it.
 
     Implements :eq:`eq-curve-distance`.
@@ -84,13 +83,8 @@ def search_curve(
     b : Corner
         m corners of it.
     T_b_a : ndarray, shape (4, 4)
-    level : int
-    near : float
-        Least depth in the first camera.
-    distance : float
-        Pixels of the level, from the curve.
-    limit : float
-        Largest ZMSSD as a share of the patch's variation.
+        Pose of the second camera.
+    gates : Gates
 
     Returns
     -------
@@ -99,25 +93,34 @@ def search_curve(
     best = OnCurve(np.full(len(a.xy), -1), np.full(len(a.xy), np.inf))
     if len(a.xy) == 0 or len(b.xy) == 0:
         return best
-    row, column = _near_curve(a, b, T_b_a, distance * float(level_sigma(level)), near)
+    distance = gates.distance * float(level_sigma(gates.level))
+    row, column = _near_curve(a, b, T_b_a, distance, gates.near)
     there = cut(image, b.xy)
     use = there.inside[column]
     row, column = row[use], column[use]
-    cost = np.empty(len(row))
-    flat = patch.reshape(-1, AREA), there.patch.reshape(-1, AREA)
-    for low in range(0, len(row), PORTION):
-        part = slice(low, low + PORTION)
-        cost[part] = zmssd(flat[0][row[part]], flat[1][column[part]])
-    cost /= np.maximum(variation(patch), 1.0)[row]
+    cost = _share_of_variation(patch, there.patch, row, column)
     order = np.lexsort((column, cost, row))
     rows, first = np.unique(row[order], return_index=True)
     winner = order[first]
     best.cost[rows] = cost[winner]
-    best.corner[rows] = np.where(cost[winner] <= limit, column[winner], -1)
+    best.corner[rows] = np.where(cost[winner] <= gates.limit, column[winner], -1)
     return best
 
 
-def _near_curve(a: Corner, b: Corner, T_b_a: Array, distance: float, near: float) -> tuple[IntArray, IntArray]:
+def _share_of_variation(a: Bytes, b: Bytes, row: IntArray, column: IntArray) -> Array:
+    """ZMSSD of pairs (p,) of patches over the variation of the first, some thousands at a time."""
+    flat_a, flat_b = a.reshape(-1, AREA), b.reshape(-1, AREA)
+    cost = np.empty(len(row))
+    for low in range(0, len(row), PORTION):
+        part = slice(low, low + PORTION)
+        cost[part] = zmssd(flat_a[row[part]], flat_b[column[part]])
+    share: Array = cost / np.maximum(variation(a), 1.0)[row]
+    return share
+
+
+def _near_curve(
+    a: Corner, b: Corner, T_b_a: Array, distance: float, near: float
+) -> tuple[IntArray, IntArray]:
     """Pairs (p,) of a point and a corner near its curve, in front of both cameras and not too close."""
     lines = a.bearing @ essential(T_b_a).T  # (n, 3): E a
     e = lines @ b.bearing.T

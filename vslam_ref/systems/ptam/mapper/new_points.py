@@ -8,27 +8,50 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.triangulation import triangulate
-from vslam_ref.features import Templates, finest_from_level, level_from_finest, level_sigma
+from vslam_ref.features import Corners, Templates, finest_from_level, level_from_finest, level_sigma
+from vslam_ref.features.fast import Pixels
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import camera_pose, se3
+from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views
 from vslam_ref.systems.ptam.look import peaks, spread, strong_corners
-from vslam_ref.systems.ptam.mapper.curve_search import Corner, search_curve, with_bearings
+from vslam_ref.systems.ptam.mapper.curve_search import Corner, Gates, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
+from vslam_ref.systems.ptam.tracker.recover import picture_of
 from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, shared_points
 from vslam_ref.systems.visual_map.measure import locate
+from vslam_ref.systems.visual_map.visual_map import Bytes
+
+WORST_PIXELS = 2.0
+"""Pixels of the level: root mean square distance of a new point from its two sightings."""
 
 
 class Side(NamedTuple):
-    """A keyframe on one level: picture, corners with rays, pose."""
+    """One level of a keyframe.
 
-    picture: Picture
-    corner: Corner
+    Attributes
+    ----------
+    kf : int
+        Number of the keyframe.
+    level : int
+    image : ndarray of uint8, shape (H, W)
+    corners : Corners
+        All of the level.
+    peaks : Corner
+        Those that stand out among their neighbours, with rays.
+    T_cam_world : ndarray, shape (4, 4)
+    """
+
+    kf: int
+    level: int
+    image: Bytes
+    corners: Corners
+    peaks: Corner
     T_cam_world: Array
 
 
 class Pairs(NamedTuple):
-    """Matches: row among the candidates (n,), pixel of level 0 in either picture (n, 2)."""
+    """Matches: row among the candidates (n,), pixels of level 0 in either picture (n, 2)."""
 
     row: IntArray
     uv_a: Array
@@ -38,21 +61,41 @@ class Pairs(NamedTuple):
 def new_points(
     visual_map: VisualMap, kf: int, picture: Picture, s: MapperSettings, f: FeatureSettings
 ) -> IntArray:
-    """Add points that the newest keyframe is the first to explain; return their numbers."""
+    """Add points that the newest keyframe is the first to explain; return their numbers (n,).
+
+    Parameters
+    ----------
+    visual_map : VisualMap
+        Changed in place.
+    kf : int
+        The keyframe.
+    picture : Picture
+        Its picture.
+    s, f : MapperSettings, FeatureSettings
+    """
     added = [np.zeros(0, np.int64)]
-    median = median_depth(visual_map, kf)
+    near = s.near * median_depth(visual_map, kf)
     for level in reversed(range(visual_map.levels)):
+        here = _side(visual_map, kf, picture, level, f)
         xy = picture.corners[level].xy[strong_corners(picture, level, f)]
         xy = xy[free(visual_map, kf, xy, level, s.spacing)]
-        xy = xy[cut(picture.levels[level], xy).inside]
-        xy = xy[spread(xy, picture.levels[level].shape, s.new_points)]
+        xy = xy[cut(here.image, xy).inside]
+        xy = xy[spread(xy, here.image.shape, s.new_points)]
         for partner in partners(visual_map, kf, s.partners):
             if len(xy) == 0:
                 break
-            numbers, used = _with_partner(visual_map, kf, picture, int(partner), xy, level, median, s, f)
+            there = _side(visual_map, int(partner), picture_of(visual_map, int(partner)), level, f)
+            pairs = match(visual_map.camera, xy, here, there, near, s, f)
+            numbers, rows = _triangulated(visual_map, here, there, pairs, s)
             added.append(numbers)
-            xy = xy[~used]
+            xy = np.delete(xy, rows, 0)
     return np.concatenate(added)
+
+
+def _side(visual_map: VisualMap, kf: int, picture: Picture, level: int, f: FeatureSettings) -> Side:
+    found = with_bearings(visual_map.camera, peaks(picture, level, f), level)
+    T = visual_map.T_kf_world[kf]
+    return Side(kf, level, picture.levels[level], picture.corners[level], found, T)
 
 
 def partners(visual_map: VisualMap, kf: int, count: int) -> IntArray:
@@ -73,8 +116,8 @@ def median_depth(visual_map: VisualMap, kf: int) -> float:
     return float(np.median(se3.act(visual_map.T_kf_world[kf], X)[:, 2])) if len(X) else 1.0
 
 
-def free(visual_map: VisualMap, kf: int, xy: IntArray, level: int, spacing: float) -> BoolArray:
-    """Which corners (n,) of a level are farther than ``spacing`` from all that the keyframe sees."""
+def free(visual_map: VisualMap, kf: int, xy: Pixels, level: int, spacing: float) -> BoolArray:
+    """Which corners (n, 2) of a level are farther than ``spacing`` from all that the keyframe sees, (n,)."""
     from scipy.spatial import cKDTree
 
     seen = visual_map.sightings
@@ -82,69 +125,64 @@ def free(visual_map: VisualMap, kf: int, xy: IntArray, level: int, spacing: floa
     if not rows.any() or len(xy) == 0:
         return np.ones(len(xy), np.bool_)
     away, _ = cKDTree(level_from_finest(seen["uv"][rows], level)).query(xy, distance_upper_bound=spacing)
-    return np.isinf(away)
-
-
-def _with_partner(
-    visual_map: VisualMap,
-    kf: int,
-    picture: Picture,
-    partner: int,
-    xy: IntArray,
-    level: int,
-    median: float,
-    s: MapperSettings,
-    f: FeatureSettings,
-) -> tuple[IntArray, BoolArray]:
-    """Points (numbers) from corners of a level and one other keyframe; which corners (n,) were used."""
-    from vslam_ref.systems.ptam.tracker.recover import picture_of
-
-    camera, used = visual_map.camera, np.zeros(len(xy), np.bool_)
-    there = picture_of(visual_map, partner)
-    T = visual_map.T_kf_world
-    a = Side(picture, with_bearings(camera, xy, level), T[kf])
-    b = Side(there, with_bearings(camera, peaks(there, level, f), level), T[partner])
-    back = with_bearings(camera, peaks(picture, level, f), level)
-    pairs = match(a, b, back, level, s.near * median, s, f)
-    if len(pairs.row) == 0:
-        return np.zeros(0, np.int64), used
-    views = Views(camera, [a.T_cam_world, b.T_cam_world])
-    found = triangulate(
-        views,
-        np.stack([pairs.uv_a, pairs.uv_b], 1),
-        sigma_px=float(level_sigma(level)),
-        min_parallax=float(np.radians(s.parallax)),
-        max_iterations=10,
-    )
-    good = found.ok & (found.rmse_px <= 2.0 * level_sigma(level))
-    numbers = visual_map.add_points(found.X_world[good], kf, level, pairs.uv_a[good])
-    visual_map.observe(partner, numbers, level, pairs.uv_b[good])
-    used[pairs.row[good]] = True
-    return numbers, used
+    return np.asarray(np.isinf(away))
 
 
 def match(
-    a: Side, b: Side, back: Corner, level: int, near: float, s: MapperSettings, f: FeatureSettings
+    camera: Camera, xy: Pixels, a: Side, b: Side, near: float, s: MapperSettings, f: FeatureSettings
 ) -> Pairs:
-    """Corners of a in b, each refined, and found back in a from where it was found in b."""
-    T_b_a = se3.between(se3.inverse(b.T_cam_world), se3.inverse(a.T_cam_world))
-    image_a, image_b = a.picture.levels[level], b.picture.levels[level]
-    patch = cut(image_a, a.corner.xy).patch
-    options = {"level": level, "distance": s.epipolar, "limit": f.limit}
-    there = search_curve(patch, a.corner, image_b, b.corner, T_b_a, near=near, **options)  # type: ignore[arg-type]
+    """Corners (n, 2) of a in b: on their curve, refined, and found back in a.
+
+    Parameters
+    ----------
+    camera : Camera
+    xy : ndarray of int, shape (n, 2)
+        Pixels of the level, with a whole patch.
+    a, b : Side
+    near : float
+        Least depth in a.
+    s, f : MapperSettings, FeatureSettings
+
+    Returns
+    -------
+    Pairs
+    """
+    T_b_a = se3.compose(b.T_cam_world, se3.inverse(a.T_cam_world))
+    asked = with_bearings(camera, xy, a.level)
+    patch = cut(a.image, xy).patch
+    gates = Gates(a.level, near, s.epipolar, f.limit)
+    there = search_curve(patch, asked, b.image, b.peaks, T_b_a, gates)
     rows = np.flatnonzero(there.corner >= 0)
-    start = b.corner.xy[there.corner[rows]].astype(np.float64)
+    start = b.peaks.xy[there.corner[rows]].astype(np.float64)
     whole = Templates(patch[rows], np.ones(len(rows), np.bool_))
     looks = Looks(f.limit, f.measure, f.absolute, True)
-    end = locate(image_b, b.picture.corners[level], whole, start, np.full(len(rows), 2.0), looks)
+    end = locate(b.image, b.corners, whole, start, np.full(len(rows), 2.0), looks)
     rows, uv = rows[end.ok], end.uv[end.ok]
-    keep = np.ones(len(rows), np.bool_)
     if s.search_back and len(rows):
-        found = b.corner.only(there.corner[rows])
-        here = cut(image_b, found.xy)
-        home = search_curve(here.patch, found, image_a, back, se3.inverse(T_b_a), near=0.0, **options)  # type: ignore[arg-type]
-        at = back.xy[np.maximum(home.corner, 0)]
-        away = np.hypot(*(at - a.corner.xy[rows]).T)
+        found = b.peaks.only(there.corner[rows])
+        here = cut(b.image, found.xy)
+        home = search_curve(here.patch, found, a.image, a.peaks, se3.inverse(T_b_a), gates._replace(near=0.0))
+        away = np.hypot(*(a.peaks.xy[home.corner] - xy[rows]).T)
         keep = here.inside & (home.corner >= 0) & (away <= s.back)
-    rows, uv = rows[keep], uv[keep]
-    return Pairs(rows, finest_from_level(a.corner.xy[rows], level), finest_from_level(uv, level))
+        rows, uv = rows[keep], uv[keep]
+    return Pairs(rows, finest_from_level(xy[rows], a.level), finest_from_level(uv, a.level))
+
+
+def _triangulated(
+    visual_map: VisualMap, a: Side, b: Side, pairs: Pairs, s: MapperSettings
+) -> tuple[IntArray, IntArray]:
+    """Add the points of matches that have depth; return their numbers and their rows among the candidates."""
+    if len(pairs.row) == 0:
+        return np.zeros(0, np.int64), pairs.row
+    sigma = float(level_sigma(a.level))
+    found = triangulate(
+        Views(visual_map.camera, np.stack([a.T_cam_world, b.T_cam_world])),
+        np.stack([pairs.uv_a, pairs.uv_b], 1),
+        sigma_px=sigma,
+        min_parallax=float(np.radians(s.parallax)),
+        max_iterations=10,
+    )
+    good = found.ok & (found.rmse_px <= WORST_PIXELS * sigma)
+    numbers = visual_map.add_points(found.X_world[good], a.kf, a.level, pairs.uv_a[good])
+    visual_map.observe(b.kf, numbers, a.level, pairs.uv_b[good])
+    return numbers, pairs.row[good]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.pose_tracking import TrackedPose, track_pose
 from vslam_ref.estimation.robust import tuned
 from vslam_ref.features import level_sigma
@@ -32,7 +32,7 @@ class Pass(NamedTuple):
 
     seen: Visible
     uv: Array
-    ok: IntArray
+    ok: BoolArray
     weights: Array
     pose: TrackedPose
 

@@ -50,7 +50,7 @@ def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> 
 def by_three_points(
     camera: Camera, X_world: Array, known: Known, rng: np.random.Generator, draws: int = DRAWS
 ) -> Consensus | None:
-    """Pose with which most matches agree, of poses from three matches; None with fewer than eight that agree."""
+    """Pose from three matches with which most of all agree; None if fewer than eight do."""
     rays = camera.unproject(known.uv)
     use = np.flatnonzero(rays.valid)
     if len(use) < 8:

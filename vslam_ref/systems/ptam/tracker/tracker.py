@@ -94,9 +94,7 @@ class Tracker:
             return None
         return self._finely(visual_map, picture, best[1], s.fine_radius, best[2])
 
-    def _finely(
-        self, visual_map: VisualMap, picture: Picture, T: Array, radius: float, way: str
-    ) -> Tracked:
+    def _finely(self, visual_map: VisualMap, picture: Picture, T: Array, radius: float, way: str) -> Tracked:
         s = self.settings.tracker
         second = fine(visual_map, picture, T, radius, s, self.looks, self.rng)
         return Tracked(second.pose.T_cam_world, quality(second, s), second, way)
@@ -136,7 +134,8 @@ class Tracker:
         self, visual_map: VisualMap, picture: Picture, there: Picture, known: recover.Known, way: str
     ) -> Tracked | None:
         s = self.settings.tracker
-        known = recover.Known(*(a[visual_map.alive[known.point]] for a in known))
+        alive = visual_map.alive[known.point]
+        known = recover.Known(known.point[alive], known.uv[alive], known.level[alive])
         went = recover.follow_known(there, picture, known, s.radius[-1])
         X = visual_map.X_world[went.point]
         agreed = recover.by_three_points(visual_map.camera, X, went, self.rng)
