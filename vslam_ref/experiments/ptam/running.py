@@ -226,9 +226,11 @@ def _waited(done: Run, frame: Frame, outcome: Outcome, before: int) -> Frame:
         elif 0 < before < start.patience:
             done.refused("too few corners were found again in the next picture: begun anew")
         return frame
-    if outcome.attempt is None:
+    if outcome.attempt is None and trails.length < start.least_motion:
         moved = f"corners moved by {trails.length:.2f} px (median)"
         done.refused(f"{moved}: a start is tried from {start.least_motion:g} px on")
+    elif outcome.attempt is None:
+        done.refused("corners were followed over too few pictures")
     marks = Marks(
         trails.now.astype(np.float32), trails.level.astype(np.uint8), trails.first.astype(np.float32)
     )
