@@ -1,4 +1,4 @@
-"""Inputs for the twin of pose tracking: points before a pinhole, some of them matched wrongly or behind it."""
+"""Inputs for the twin of pose tracking: points before a pinhole, some matched wrongly, one behind it."""
 
 from __future__ import annotations
 
