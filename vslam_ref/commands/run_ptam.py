@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
     assert out is not None  # --out is required
     settings = apply_overrides(Settings(), options.set)
     sequence = open_source(options)
-    warm("features", "patches", "bundle", "bundle_schur")
+    warm("features", "patches", "pose", "bundle", "bundle_schur")
     with files.new_folder(out) as folder, interrupts() as interrupted:
         began = time.perf_counter()
         done = follow(sequence, settings, interrupted)
