@@ -9,10 +9,11 @@ from vslam_ref.commands import run_log, run_ptam
 HELP = "run a system over recorded data and compare it with the truth"
 FAMILIES = (run_log, run_ptam)
 """Modules with ``SYSTEMS``, ``EPILOG``, ``add_arguments`` and ``run``, as a command has them."""
+SYSTEMS = {name: what for family in FAMILIES for name, what in family.SYSTEMS.items()}
 EPILOG = "\n\n".join(
     [
         "'vslam-ref run SYSTEM --help' shows the options of a system.\n\nsystems:\n"
-        + "\n".join(f"  {name:<12}{what}" for family in FAMILIES for name, what in family.SYSTEMS.items()),
+        + "\n".join(f"  {name:<12}{what}" for name, what in SYSTEMS.items()),
         *(family.EXAMPLES for family in FAMILIES),
     ]
 )
