@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 SYSTEMS = {"ptam": "PTAM: a path and a map of points from the pictures of one moving camera"}
 EPILOG = """\
-SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, or
-the name of a data set that VSLAM_REF_DATA finds. Where no camera lies beside the pictures, give --camera: any
+SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, the
+name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where no camera lies beside the pictures, give --camera: any
 camera file that this library reads, or one line 'fx fy cx cy width height'.
 
 numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final
@@ -41,7 +41,12 @@ Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
 A scene that allows no start ends with status 0 and the reason.
 '--set tracker.fine_points=500' changes a setting."""
 EXAMPLES = """\
-examples with your own pictures:
+examples, after 'vslam-ref sample video --out samples':
+  vslam-ref run ptam samples/video --out out/desk
+  vslam-ref run ptam samples/video/film.avi --camera samples/video/calib.txt --video full --out out/film
+with a rendered scene, which has its own camera and truth:
+  vslam-ref run ptam desk --to 60 --out out/desk
+with your own pictures:
   vslam-ref run ptam walk.mp4 --camera camera.yaml --out out/walk
   vslam-ref run ptam pictures/ --camera camera.yaml --rate 10 --truth groundtruth.txt --out out/pictures
 and with known data sets:

@@ -95,6 +95,8 @@ class Course(NamedTuple):
     ----------
     number : ndarray, shape (n,)
         Of the picture.
+    trails : ndarray, shape (n,)
+        Corners that are followed before there is a map.
     tried, found : ndarray, shape (n,)
         Points.
     sigma : ndarray, shape (n,)
@@ -106,6 +108,7 @@ class Course(NamedTuple):
     """
 
     number: NDArray[np.int64]
+    trails: Array
     tried: Array
     found: Array
     sigma: Array
@@ -144,11 +147,12 @@ def course_figure(course: Course, title: str) -> Figure:
 
 
 def _points(panel: Axes, course: Course) -> None:
+    panel.plot(course.number, course.trails, ":", color=style.GREEN, lw=1.4, label="corners before the start")
     panel.fill_between(course.number, course.tried, color=style.SKY, alpha=0.35, lw=0, label="tried")
     panel.plot(course.number, course.found, color=style.BLUE, lw=1.1, label="found")
     panel.set_ylim(bottom=0)
     panel.set_ylabel("points")
-    panel.legend(loc="lower right", frameon=False, ncols=2)
+    panel.legend(loc="lower right", frameon=False, ncols=3)
 
 
 def _quality(panel: Axes, course: Course) -> None:

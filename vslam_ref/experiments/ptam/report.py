@@ -123,6 +123,7 @@ def course(run: Run) -> Course:
     before = np.array([f.state == WAITING for f in frames], bool)
     return Course(
         np.array([f.number for f in frames], np.int64),
+        np.where(before, tried, np.nan),
         np.where(before, np.nan, tried),
         np.where(before, np.nan, found),
         sigma,
@@ -142,7 +143,7 @@ def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures
         pages.tag("p", pages.tag("span", f"No start: {content['no_start']}.", class_="strong"))
         if content["no_start"]
         else "",
-        _notes(content["notes"]),
+        _notes([note for note in content["notes"] if not note.startswith("no start:")]),
         _film(folder / FILM),
         pages.table([], number_rows(content), caption="Numbers", kind="numbers"),
         *images,
