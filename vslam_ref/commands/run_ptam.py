@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 SYSTEMS = {"ptam": "PTAM: a path and a map of points from the pictures of one moving camera"}
 EPILOG = """\
 SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, the
-name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where no camera lies beside the pictures, give --camera: any
-camera file that this library reads, or one line 'fx fy cx cy width height'.
+name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where
+no camera lies beside the pictures, give --camera: any camera file that this library reads, or one line
+'fx fy cx cy width height'.
 
 numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final
 and the live path after alignment by a similarity (null without truth); scale_drift, the scale that brings the

@@ -213,7 +213,7 @@ def _start_marks(attempt: Attempt) -> Marks:
 
 
 def _waited(done: Run, frame: Frame, outcome: Outcome, before: int) -> Frame:
-    """No map yet: note the reason, and the trails to be drawn; ``before`` is over how many pictures they ran."""
+    """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
     trails, start = done.system.trails, done.settings.start
     if isinstance(outcome.attempt, Attempt):
         done.refused(outcome.attempt.reason)
