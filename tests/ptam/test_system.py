@@ -44,23 +44,27 @@ def test_without_adjustment_the_path_is_not_right(film: Film, monkeypatch: pytes
     assert path_error(film, run(film)) > LARGEST_SHARE
 
 
-def test_a_point_is_found_where_it_is_on_every_level(film: Film, desk: Run) -> None:
-    """What is found on one level is not shifted against the rest: half of its pixel would be seen at once."""
+def test_levels_agree_about_where_things_are(film: Film, desk: Run) -> None:
+    """Median shift of all found points against the final map, a level at a time, in that level's pixels.
+
+    Errors have a sigma of 0.4; the median of 1500 has a standard error of 1.25 * 0.4 / 1500^(1/2) = 0.013,
+    and three of them are 0.04.  Without the half pixel of level 1 it is 0.07 to 0.10.
+    """
     system = desk.system
     assert system.map is not None
-    (_, T), asked = system.trajectory(), 0
-    for outcome in desk.outcomes[20:]:
-        fine = outcome.tracked.fine  # type: ignore[union-attr]
-        held = fine.weights > 0
-        at = film.camera.pixel_from_world(T[outcome.number], system.map.X_world[fine.seen.point[held]])
-        shift = fine.uv[held] - at.uv
-        level = fine.seen.level[held]
-        for each in range(4):
-            rows = level == each
-            if rows.sum() >= 20:
-                assert np.abs(np.median(shift[rows], axis=0)).max() < 0.25 * 2**each
-                asked += 1
-    assert asked > 20
+    _, T = system.trajectory()
+    shift: list[list[np.ndarray]] = [[], []]
+    for outcome in desk.outcomes:
+        if outcome.tracked is not None:
+            fine = outcome.tracked.fine
+            at = film.camera.pixel_from_world(T[outcome.number], system.map.X_world[fine.seen.point])
+            for level in (0, 1):
+                rows = (fine.seen.level == level) & (fine.weights > 0) & at.valid
+                shift[level].append((fine.uv - at.uv)[rows])
+    for level in (0, 1):
+        every = np.concatenate(shift[level])
+        assert len(every) > 1000
+        assert np.abs(np.median(every, axis=0)).max() < 0.04 * 2**level
 
 
 def test_the_same_pictures_give_the_same_bytes(film: Film, desk: Run) -> None:
@@ -118,9 +122,9 @@ def test_a_camera_that_rests_does_not_start(film: Film) -> None:
 
 
 def test_a_camera_that_only_turns_does_not_start_and_says_why() -> None:
-    world = scene("rotation", 2, size=(320, 240), frames=30)
+    world = scene("rotation", 2, size=(320, 240), frames=18)
     system = Ptam(world.camera)
-    outcomes = [system.step(k, world.frame(k)) for k in range(30)]
+    outcomes = [system.step(k, world.frame(k)) for k in range(18)]
     assert system.map is None
     reasons = [o.attempt if isinstance(o.attempt, str) else o.attempt.reason for o in outcomes if o.attempt]
     assert reasons
