@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.ptam import raster, solids
+from vslam_ref.experiments.ptam import overlay, raster, running, solids
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Fov, Pinhole
 
@@ -122,6 +122,27 @@ def test_the_grid_goes_through_the_lens(camera: Pinhole | Fov) -> None:
     assert (X[..., 2] <= 0).any()
     assert seen[inside].all()
     np.testing.assert_allclose(se3.act(T, view.eye), 0.0, atol=1e-12)
+
+
+def test_what_stands_on_the_plane_is_seen_where_the_map_has_it() -> None:
+    """A point of the map, once through the plane's frame and once straight."""
+    camera, T_cam_world = Pinhole(200.0, 200.0, 159.5, 119.5), se3.exp([0.1, 0.2, 0.3, 0.1, -0.2, 0.3])
+    stage = overlay.Stage(se3.exp([0.4, -0.5, 1.0, 0.7, 0.2, 1.1]), 0.5)
+    X_world = np.random.default_rng(0).uniform(-1, 1, (20, 3)) + [0, 0, 4]
+    view = overlay.view_of(camera, (320, 240), T_cam_world, stage)
+    uv, seen = view.pixels(se3.act(stage.T_plane_world, X_world))
+    assert seen.all()
+    np.testing.assert_allclose(uv, camera.project(se3.act(T_cam_world, X_world)).uv, atol=1e-9)
+
+
+def test_points_of_a_picture_are_drawn_in_the_colour_of_their_level() -> None:
+    marks = running.Marks(
+        np.array([[10, 10], [30, 10], [10, 30], [40, 30]], np.float32), np.arange(4, dtype=np.uint8)
+    )
+    image = canvas()
+    overlay.draw_marks(image, running.Frame(0, 0.0, running.GOOD, marks=marks), 1.0)
+    assert [tuple(image[y, x].tolist()) for x, y in marks.uv.astype(int)] == list(overlay.LEVELS)
+    assert len(set(overlay.LEVELS)) == 4
 
 
 def test_the_grid_is_square_and_has_its_lines() -> None:

@@ -12,7 +12,8 @@ FAMILIES = (run_log, run_ptam)
 SYSTEMS = {name: what for family in FAMILIES for name, what in family.SYSTEMS.items()}
 EPILOG = "\n\n".join(
     [
-        "'vslam-ref run SYSTEM --help' shows the options of a system.\n\nsystems:\n"
+        "'vslam-ref run SYSTEM --help' shows the options of a system;\n"
+        "all have --out DIR, --json FILE and --set KEY=VALUE.\n\nsystems:\n"
         + "\n".join(f"  {name:<12}{what}" for name, what in SYSTEMS.items()),
         *(family.EXAMPLES for family in FAMILIES),
     ]

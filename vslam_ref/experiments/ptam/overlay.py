@@ -18,6 +18,7 @@ from vslam_ref.datasets import video
 from vslam_ref.experiments.ptam import raster, solids
 from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, START, WAITING, Frame, Run, path
 from vslam_ref.geometry import se3
+from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.visual_map.plane import Plane, dominant_plane
 
 Bytes = NDArray[np.uint8]
@@ -131,11 +132,15 @@ def picture(run: Run, frame: Frame, T_cam_world: Array | None, stage: Stage | No
     image = np.repeat(source.grey[..., None], 3, -1) if source.colour is None else source.colour.copy()
     camera = run.sequence.camera
     if T_cam_world is not None and stage is not None and camera is not None:
-        T_cam_plane = se3.compose(T_cam_world, se3.inverse(stage.T_plane_world))
-        draw_stage(image, solids.View(camera, (width, height), T_cam_plane), stage.cell, unit)
+        draw_stage(image, view_of(camera, (width, height), T_cam_world, stage), stage.cell, unit)
     draw_marks(image, frame, unit)
     image[height - int(np.ceil(3 * unit)) :] = STATES.get(frame.state, ABSENT)
     return image
+
+
+def view_of(camera: Camera, size: tuple[int, int], T_cam_world: Array, stage: Stage) -> solids.View:
+    """The stage as a camera at a pose (4, 4) sees it."""
+    return solids.View(camera, size, se3.compose(T_cam_world, se3.inverse(stage.T_plane_world)))
 
 
 def draw_stage(image: Bytes, view: solids.View, cell: float, unit: float) -> None:
