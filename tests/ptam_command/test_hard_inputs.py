@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import cv2
 import numpy as np
 import pytest
 import small_world
+
+from vslam_ref.experiments.ptam import overlay, running
 
 
 def pictures(folder: Path, images: list[np.ndarray]) -> Path:
@@ -83,6 +86,27 @@ def test_no_start_is_told_with_its_reason(
     assert reason in (tmp_path / "out" / "report.html").read_text()
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"result.json", "report.html", "course.png", "overlay.webm"}
+
+
+@pytest.mark.parametrize(("number", "films"), [(2, 3), (4, 5)], ids=["third", "last"])
+def test_an_interrupt_while_the_film_is_drawn_saves_all_but_the_rest_of_it(
+    run: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, films: int
+) -> None:
+    real = overlay.picture
+
+    def drawn(run: running.Run, frame: running.Frame, *more: object) -> np.ndarray:
+        if frame.number == number:
+            signal.raise_signal(signal.SIGINT)
+        return real(run, frame, *more)
+
+    monkeypatch.setattr(overlay, "picture", drawn)
+    folder = pictures(tmp_path / "still", [small_world.picture(0)] * 5)
+    assert run(folder, "--out", tmp_path / "out", "--json", tmp_path / "n.json") == 130
+    n = json.loads((tmp_path / "n.json").read_text())
+    assert (n["frames"], n["interrupted"]) == (5, True)
+    assert ("the film was interrupted after 3 of 5 pictures" in n["notes"]) == (films == 3)
+    film = cv2.VideoCapture(str(tmp_path / "out" / "overlay.webm"))
+    assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == films
 
 
 def test_one_picture_and_none_that_can_be_read(run: Callable[..., int], tmp_path: Path) -> None:

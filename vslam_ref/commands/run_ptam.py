@@ -101,6 +101,7 @@ def run(options: argparse.Namespace) -> int:
         draw(folder / report.FILM, done, options.video, interrupted)
         content = numbers.document(done, time.perf_counter() - began)
         report.write_report(folder, done, content)
+        done.interrupted |= interrupted.asked
     print(table(["what", "value", "unit"], numbers.number_rows(content)))
     for note in content["notes"]:
         print(f"note: {note}")
@@ -130,6 +131,7 @@ def follow(sequence: Sequence, settings: Settings, interrupted: Interrupts) -> R
 
     with progress_bar(len(sequence), "tracking") as progress:
         done = running.run(sequence, settings, lambda: interrupted.asked, progress)
+    done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     return done
 
