@@ -8,7 +8,7 @@ from typing import Any
 
 from vslam_ref.commands.options import add_json, json_target, write_json
 
-HELP = "show the chapters, experiments and filters, and the data sets found"
+HELP = "show the chapters, experiments, systems and filters, and the data sets found"
 EPILOG = "example: vslam-ref list --json list.json"
 
 FILTERS = (
@@ -35,6 +35,8 @@ def run(options: argparse.Namespace) -> int:
     print("Chapters (docs/chapters/, notebooks/)\n" + table(["no", "title", "module", "state"], rows))
     rows = [[e["id"], e["title"], e["source"]] for e in content["experiments"]]
     print("\nExperiments (vslam-ref reproduce ID)\n" + table(["id", "title", "source"], rows))
+    rows = [[s["name"], s["what"]] for s in content["systems"]]
+    print("\nSystems (vslam-ref run NAME)\n" + table(["name", "what"], rows))
     print("\nFilters\n" + table(["name", "what", "module"], [list(row) for row in FILTERS]))
     found = content["data_sets_found"]
     rows = [[name, folder] for name, folder in found.items()]
@@ -54,6 +56,7 @@ def _none_found() -> str:
 def contents() -> dict[str, Any]:
     """Return all lists as plain data."""
     from vslam_ref.chapters import CHAPTERS
+    from vslam_ref.commands.run import SYSTEMS
     from vslam_ref.datasets.catalogue import find
     from vslam_ref.datasets.known import DATA_SETS
     from vslam_ref.experiments.registry import summaries
@@ -65,6 +68,7 @@ def contents() -> dict[str, Any]:
             for c in CHAPTERS
         ],
         "experiments": [summary._asdict() for summary in summaries()],
+        "systems": [{"name": name, "what": what} for name, what in SYSTEMS.items()],
         "filters": [{"name": name, "what": what, "module": module} for name, what, module in FILTERS],
         "data_sets_found": {name: str(folder) for name, folder in folders.items() if folder},
     }

@@ -1,80 +1,41 @@
-"""``vslam-ref run``: a system over recorded data."""
+"""``vslam-ref run``: a system over recorded data.  Each family of systems has a module of its own."""
 
 from __future__ import annotations
 
 import argparse
 
-from vslam_ref.commands.options import (
-    add_json,
-    add_set,
-    at_least,
-    folder_target,
-    json_target,
-    print_backend,
-    warm,
-    write_json,
-)
+from vslam_ref.commands import run_log, run_ptam
 
 HELP = "run a system over recorded data and compare it with the truth"
-EPILOG = """\
-systems:
-  ekf-slam    EKF-SLAM; the IEKF, the anchored EKF and a batch solution are shown beside it
-  iekf-slam   IEKF-SLAM: the improved EKF of seed B (neither invariant nor iterated); same company
-
-data sets: mrclam (--robot N) and victoria_park, found through VSLAM_REF_DATA, or a folder in their format.
-Gains and noises are those identified without truth; '--set calibration.sigma_range=0.05' changes one,
-'--set run.gate=9' a setting of the run.
-
-examples, after 'vslam-ref sample robot --out samples':
-  vslam-ref run iekf-slam samples/robot --out out/robot
-  vslam-ref run ekf-slam samples/robot --no-batch --set calibration.turn_gain=1 --json robot.json
-and with known data sets:
-  vslam-ref run ekf-slam mrclam --robot 3 --out out/robot3
-  vslam-ref run iekf-slam victoria_park --out out/park"""
-
-SYSTEMS = {"ekf-slam": "ekf", "iekf-slam": "iekf"}
-"""System -> the filter whose numbers stand on top of the JSON."""
+FAMILIES = (run_log, run_ptam)
+"""Modules with ``SYSTEMS``, ``EPILOG``, ``add_arguments`` and ``run``, as a command has them."""
+SYSTEMS = {name: what for family in FAMILIES for name, what in family.SYSTEMS.items()}
+EPILOG = "\n\n".join(
+    [
+        "'vslam-ref run SYSTEM --help' shows the options of a system;\n"
+        "all have --out DIR, --json FILE and --set KEY=VALUE.\n\nsystems:\n"
+        + "\n".join(f"  {name:<12}{what}" for name, what in SYSTEMS.items()),
+        *(family.EXAMPLES for family in FAMILIES),
+    ]
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of this command."""
-    parser.add_argument("system", choices=sorted(SYSTEMS), metavar="SYSTEM", help="what to run; see below")
-    parser.add_argument("dataset", metavar="DATASET", help="what to run it on; see below")
-    parser.add_argument("--robot", type=at_least(1), metavar="N", help="robot of an MRCLAM set (default: 1)")
-    parser.add_argument("--out", metavar="DIR", help="write figures, trajectories, maps and a page there")
-    parser.add_argument("--no-batch", action="store_true", help="leave the batch solution out")
-    add_set(parser)
-    add_json(parser)
+    """Declare the systems, each with its own arguments."""
+    systems = parser.add_subparsers(metavar="SYSTEM", dest="system", required=True, help="see below")
+    for family in FAMILIES:
+        for name, what in family.SYSTEMS.items():
+            one = systems.add_parser(
+                name,
+                description=what,
+                epilog=f"{family.EPILOG}\n\n{family.EXAMPLES}",
+                formatter_class=argparse.RawDescriptionHelpFormatter,
+            )
+            family.add_arguments(one)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the filters over a log, print and write their numbers."""
-    import time
-
-    from vslam_ref.commands.tables import table
-    from vslam_ref.experiments.slam_log import compare as logs
-    from vslam_ref.support.config import apply_overrides
-    from vslam_ref.support.provenance import versions
-
-    target = json_target(options)
-    out = folder_target(options.out)
-    source = logs.open_source(options.dataset, options.robot)
-    warm("slam", "reduced")
-    began = time.perf_counter()
-    config = apply_overrides(logs.default_config(source.dataset), options.set)
-    comparison = logs.compare(source, config, batch=not options.no_batch)
-    content = logs.document(comparison, SYSTEMS[options.system])
-    content |= {"seconds": time.perf_counter() - began, "versions": versions()}
-
-    from vslam_ref.experiments.slam_log import report
-
-    heads, rows = report.number_rows(content)
-    seen, truth = content["sightings"], content["truth"] or "none"
-    print(f"{source.log.name}: {seen} sightings of landmarks, truth: {truth}")
-    print(table(heads, rows))
-    print_backend()
-    if out is not None:
-        report.write_report(out, comparison, content)
-        print(f"page: {out / 'report.html'}")
-    write_json(target, content)
-    return 0
+    """Hand over to the family of the system."""
+    family = next(family for family in FAMILIES if options.system in family.SYSTEMS)
+    status: int = family.run(options)
+    return status

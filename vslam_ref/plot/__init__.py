@@ -9,6 +9,7 @@ module                        holds
 ``plane``                     vehicles, landmarks and covariance ellipses
 ``trajectory``                estimated and true path from above, error over time
 ``slam_log``                  map, trajectory and 3 sigma bands of a recorded log
+``visual_slam``               map and path from three sides, tracking over the pictures
 ``saving``                    figures as files, the same bytes every time
 ============================  =====================================================================
 

@@ -46,7 +46,6 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
     truth = scene.trajectory()
     trajectories.write(folder / "groundtruth_tum.txt", truth, "tum")
     length = float(np.linalg.norm(np.diff(truth.t_world_body, axis=0), axis=1).sum())
-    say = "from vslam_ref.datasets.sequences import open_sequence; print(len(open_sequence('samples/video')))"
     known = {
         "scene": "desk",
         "scene_seed": seed,
@@ -54,4 +53,4 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
         "camera": camera.params.tolist(),
         "path_m": length,
     }
-    return Made(README, (f'python -c "{say}"',), known)
+    return Made(README, ("vslam-ref run ptam samples/video --out out/desk",), known)

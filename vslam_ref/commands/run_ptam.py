@@ -1,0 +1,156 @@
+"""``vslam-ref run ptam``: monocular tracking and mapping over pictures."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vslam_ref.commands.options import (
+    add_json,
+    add_set,
+    at_least,
+    folder_target,
+    json_target,
+    print_backend,
+    warm,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from vslam_ref.datasets.sequences import Sequence
+    from vslam_ref.experiments.ptam.interrupting import Interrupts
+    from vslam_ref.experiments.ptam.running import Run
+    from vslam_ref.systems.ptam.settings import Settings
+
+SYSTEMS = {"ptam": "PTAM: a path and a map of points from the pictures of one moving camera"}
+EPILOG = """\
+SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, the
+name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where
+no camera lies beside the pictures, give --camera: any camera file that this library reads, or one line
+'fx fy cx cy width height'.
+
+numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final
+and the live path after alignment by a similarity (null without truth); scale_drift, the scale that brings the
+last third of the path to the truth over that of the first (below 1: the map grew); pictures a second without
+reading and drawing.
+
+Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
+A scene that allows no start ends with status 0 and the reason.
+'--set tracker.fine_points=500' changes a setting."""
+EXAMPLES = """\
+examples, after 'vslam-ref sample video --out samples':
+  vslam-ref run ptam samples/video --out out/desk
+  vslam-ref run ptam samples/video/film.avi --camera samples/video/calib.txt --video full --out out/film
+with a rendered scene, which has its own camera and truth:
+  vslam-ref run ptam desk --to 60 --out out/desk
+with your own pictures:
+  vslam-ref run ptam walk.mp4 --camera camera.yaml --out out/walk
+  vslam-ref run ptam pictures/ --camera camera.yaml --rate 10 --truth groundtruth.txt --out out/pictures
+and with known data sets:
+  vslam-ref run ptam new_tsukuba_150 --out out/tsukuba --json tsukuba.json
+  vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
+VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
+INTERRUPTED = 128 + signal.SIGINT
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this system."""
+    parser.add_argument("source", metavar="SOURCE", help="pictures; see below")
+    parser.add_argument("--out", metavar="DIR", required=True, help="write paths, map, film and page there")
+    parser.add_argument("--camera", metavar="FILE", help="camera, instead of that beside the pictures")
+    parser.add_argument(
+        "--from", dest="first", type=at_least(0), default=0, metavar="I", help="first picture (default: 0)"
+    )
+    parser.add_argument("--to", dest="end", type=at_least(1), metavar="J", help="end before picture J")
+    parser.add_argument(
+        "--every", type=at_least(1), default=1, metavar="K", help="only every K-th picture (default: 1)"
+    )
+    parser.add_argument("--truth", metavar="FILE", help="true path (TUM, KITTI or EuRoC format)")
+    clock = parser.add_mutually_exclusive_group()
+    clock.add_argument("--times", metavar="FILE", help="one time a line, seconds")
+    clock.add_argument("--rate", type=float, metavar="HZ", help="pictures a second, where no times are known")
+    parser.add_argument("--video", choices=("small", "half", "full", "none"), default="small", help=VIDEO)
+    add_set(parser)
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run PTAM over the pictures, print and write what there is to tell."""
+    import time
+
+    target, out = json_target(options), folder_target(options.out)
+
+    from vslam_ref.commands.tables import table
+    from vslam_ref.experiments.ptam import numbers, report
+    from vslam_ref.experiments.ptam.interrupting import interrupts
+    from vslam_ref.support import files
+    from vslam_ref.support.config import apply_overrides
+    from vslam_ref.systems.ptam.settings import Settings
+
+    assert out is not None  # --out is required
+    settings = apply_overrides(Settings(), options.set)
+    sequence = open_source(options)
+    warm("features", "patches", "pose", "bundle", "bundle_schur")
+    with files.new_folder(out) as folder, interrupts() as interrupted:
+        began = time.perf_counter()
+        done = follow(sequence, settings, interrupted)
+        draw(folder / report.FILM, done, options.video, interrupted)
+        content = numbers.document(done, time.perf_counter() - began)
+        report.write_report(folder, done, content)
+        done.interrupted |= interrupted.asked
+    print(table(["what", "value", "unit"], numbers.number_rows(content)))
+    for note in content["notes"]:
+        print(f"note: {note}")
+    print_backend()
+    print(f"page: {out / 'report.html'}")
+    write_json(target, content)
+    return INTERRUPTED if done.interrupted else 0
+
+
+def open_source(options: argparse.Namespace) -> Sequence:
+    """Open the pictures that were asked for."""
+    from vslam_ref.datasets.sequences import open_sequence
+
+    sequence = open_sequence(
+        options.source,
+        camera=options.camera,
+        times=options.times,
+        rate=options.rate,
+        truth=options.truth,
+    )
+    return sequence.part(options.first, options.end, options.every)
+
+
+def follow(sequence: Sequence, settings: Settings, interrupted: Interrupts) -> Run:
+    """Run with a progress bar; Ctrl-C ends it after the picture."""
+    from vslam_ref.experiments.ptam import running
+
+    with progress_bar(len(sequence), "tracking") as progress:
+        done = running.run(sequence, settings, lambda: interrupted.asked, progress)
+    done.interrupted |= interrupted.asked  # perhaps at the last picture
+    interrupted.asked = False  # the next ends the film
+    return done
+
+
+def draw(target: Path, done: Run, size: str, interrupted: Interrupts) -> None:
+    """Make the film, if one is wanted; Ctrl-C ends it early."""
+    from vslam_ref.experiments.ptam import overlay
+
+    if size == "none":
+        return
+    with progress_bar(len(done.frames), "film") as progress:
+        done.filmed = overlay.film(target, done, size, lambda: interrupted.asked, progress)
+    done.interrupted |= interrupted.asked
+
+
+@contextmanager
+def progress_bar(total: int, what: str) -> Iterator[Callable[[], Any]]:
+    """Show progress and pictures a second on a terminal; be silent elsewhere."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=what, unit="picture", disable=None, leave=False) as bar:
+        yield bar.update

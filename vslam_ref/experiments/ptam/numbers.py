@@ -1,0 +1,217 @@
+"""The numbers of a run: counts, errors against the truth, times."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vslam_ref import _kernels
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.sequences import Sequence
+from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, START, UNUSABLE, WAITING, Frame, Run, path
+from vslam_ref.geometry import se3
+from vslam_ref.geometry.alignment import Alignment
+from vslam_ref.metrics.trajectory import Trajectory, absolute_error
+from vslam_ref.support.config import assumptions
+from vslam_ref.support.provenance import versions
+from vslam_ref.systems.ptam.settings import Settings
+
+LEAST_THIRD = 3
+"""Pairs of poses in a third of the path, that its scale may be measured."""
+ROWS = (
+    ("frames", "pictures", ""),
+    ("unusable", "pictures that could not be used", ""),
+    ("started_at", "the two pictures of the start", ""),
+    ("tracked", "pictures with a pose", ""),
+    ("lost", "pictures lost after the start", ""),
+    ("relocalised", "pictures found again by a keyframe", ""),
+    ("keyframes", "keyframes", ""),
+    ("points", "points in the map", ""),
+    ("ate_rmse", "ATE of the final path, RMSE after a similarity", "truth's unit"),
+    ("ate_percent", "the same, of the true path's length", "%"),
+    ("ate_live_rmse", "ATE of the live path", "truth's unit"),
+    ("scale_drift", "scale of the last third over that of the first", ""),
+    ("fps", "pictures a second, tracking and mapping", "1/s"),
+    ("seconds", "time of the run, with reading and drawing", "s"),
+)
+"""Key in the JSON, words and unit in the table."""
+
+
+class Accuracy(NamedTuple):
+    """A path against the truth; None where it cannot be told, and then why.
+
+    Attributes
+    ----------
+    rmse, percent, drift : float or None
+        ATE, in the truth's unit and of the true path's length; scale S_truth_map of the last third over that
+        of the first.
+    alignment : Alignment or None
+        S_truth_map.
+    truth : ndarray, shape (n, 3)
+        True positions that were paired.
+    reason : str
+    """
+
+    rmse: float | None
+    percent: float | None
+    drift: float | None
+    alignment: Alignment | None
+    truth: Array
+    reason: str
+
+
+def accuracy(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> Accuracy:
+    """Compare poses ``T_cam_world`` (n, 4, 4) of the pictures ``numbers`` (n,) with the truth."""
+    nothing = Accuracy(None, None, None, None, np.zeros((0, 3)), "")
+    if sequence.truth is None:
+        return nothing
+    pairs = sequence.pairs()
+    rows = {int(number): row for row, number in enumerate(numbers)}
+    both = [(rows[int(a)], int(b)) for a, b in zip(*pairs, strict=True) if int(a) in rows]
+    if len(both) < LEAST_THIRD:
+        what = f"{len(both)} pictures have a pose and a true pose: need {LEAST_THIRD}"
+        return nothing._replace(reason=what)
+    mine, theirs = np.array(both).T
+    estimate, truth = trajectory(None, T_cam_world[mine]), sequence.truth.take(theirs)
+    truth = Trajectory(None, truth.t_world_body, truth.R_world_body)
+    try:
+        found = absolute_error(estimate, truth, "sim3")
+    except ValueError as error:
+        return nothing._replace(reason=str(error))
+    length = float(np.linalg.norm(np.diff(truth.t_world_body, axis=0), axis=1).sum())
+    percent = 100 * found.stats.rmse / length if length > 0 else None
+    drift = _drift(estimate, truth)
+    return Accuracy(found.stats.rmse, percent, drift, found.alignment, truth.t_world_body, "")
+
+
+def _drift(estimate: Trajectory, truth: Trajectory) -> float | None:
+    """Scale of the last third over that of the first; None where one is not known."""
+    third = len(truth) // 3
+    if third < LEAST_THIRD:
+        return None
+    scale = []
+    for rows in (np.arange(third), np.arange(len(truth) - third, len(truth))):
+        try:
+            scale.append(absolute_error(estimate.take(rows), truth.take(rows), "sim3").alignment.scale)
+        except ValueError:
+            return None
+    return scale[1] / scale[0]
+
+
+def trajectory(times: Array | None, T_cam_world: Array) -> Trajectory:
+    """Poses ``T_cam_world`` (n, 4, 4) as a trajectory of the camera in the world, in the order of time."""
+    T = se3.inverse(T_cam_world)
+    path = Trajectory(None, T[:, :3, 3], T[:, :3, :3])
+    if times is None:
+        return path
+    order = np.argsort(times, kind="stable")  # stamps may fall
+    sorted_path = path.take(order)
+    return Trajectory(times[order], sorted_path.t_world_body, sorted_path.R_world_body)
+
+
+def document(run: Run, seconds: float) -> dict[str, Any]:
+    """Return everything that is printed, and written as JSON."""
+    system, frames = run.system, run.frames
+    count = Counter(frame.state for frame in frames)
+    numbers, T = path(run)
+    final, live = accuracy(run.sequence, numbers, T), accuracy(run.sequence, *path(run, live=True))
+    visual_map = system.map
+    return {
+        "system": "ptam",
+        "source": run.sequence.name,
+        "frames": len(frames),
+        "unusable": count[UNUSABLE],
+        "started_at": system.started_at,
+        "no_start": run.no_start(),
+        "tracked": len(numbers),
+        "lost": count[LOST],
+        "relocalised": sum(f.way == "relocalised" and f.state != LOST for f in frames),
+        "keyframes": 0 if visual_map is None else len(visual_map.keyframes),
+        "points": 0 if visual_map is None else int(visual_map.alive.sum()),
+        "ate_rmse": final.rmse,
+        "ate_percent": final.percent,
+        "ate_live_rmse": live.rmse,
+        "scale_drift": final.drift,
+        "fps": _rate(frames),
+        "stage_ms": stage_ms(run),
+        "seconds": seconds,
+        "interrupted": run.interrupted,
+        "start": _start(run),
+        "refusals": {run.examples[kind]: n for kind, n in run.refusals.most_common()},
+        "settings": changed(run.settings),
+        "backend": _kernels.backend(),
+        "versions": versions(),
+        "notes": notes(run, final),
+    }
+
+
+def _rate(frames: list[Frame]) -> float | None:
+    """Pictures after the start over the time they took."""
+    times = [frame.seconds for frame in frames if frame.state in (GOOD, POOR, LOST)]
+    return len(times) / sum(times) if times else None
+
+
+def stage_ms(run: Run) -> dict[str, float | None]:
+    """Median milliseconds of a picture of each kind, and of the last adjustment."""
+    kinds: Mapping[str, list[float]] = {
+        "before_start": [f.seconds for f in run.frames if f.state == WAITING],
+        "start": [f.seconds for f in run.frames if f.state == START],
+        "tracking": [f.seconds for f in run.frames if f.state in (GOOD, POOR, LOST) and not f.keyframe],
+        "tracking_and_keyframe": [f.seconds for f in run.frames if f.state in (GOOD, POOR) and f.keyframe],
+        "last_adjustment": [run.finish_seconds] if run.system.map is not None else [],
+    }
+    return {kind: 1e3 * float(np.median(s)) if s else None for kind, s in kinds.items()}
+
+
+def _start(run: Run) -> dict[str, Any] | None:
+    """What the start was judged by."""
+    if run.start is None:
+        return None
+    found, limits = run.start, run.settings.start
+    return {
+        "cost": found.cost,
+        "cost_limit": limits.cost,
+        "parallax_deg": found.parallax,
+        "points": int(found.good.sum()),
+        "rivals": [{"answer": str(name), "cost": float(cost)} for name, cost in found.rivals],
+    }
+
+
+def changed(settings: Settings) -> dict[str, dict[str, Any]]:
+    """Settings that are not as they come: value and default."""
+    rows = assumptions(settings, Settings())
+    return {
+        r["key"]: {"value": r["value"], "default": r["default"]} for r in rows if r["value"] != r["default"]
+    }
+
+
+def notes(run: Run, final: Accuracy) -> list[str]:
+    """What a reader of the numbers should know."""
+    told = list(run.sequence.notes)
+    if len(run.frames) < len(run.sequence):
+        told.append(f"interrupted after {len(run.frames)} of {len(run.sequence)} pictures")
+    if run.filmed is not None and run.filmed < len(run.frames):
+        told.append(f"the film was interrupted after {run.filmed} of {len(run.frames)} pictures")
+    if (reason := run.no_start()) is not None:
+        told.append(f"no start: {reason}")
+    elif final.reason:
+        told.append(f"no error against the truth: {final.reason}")
+    return told
+
+
+def number_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of the table of numbers; what is not known is left out."""
+    rows = [[words, _show(content[key]), unit] for key, words, unit in ROWS if content[key] is not None]
+    stages = content["stage_ms"].items()
+    return rows + [
+        [f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in stages if v is not None
+    ]
+
+
+def _show(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return ", ".join(map(str, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

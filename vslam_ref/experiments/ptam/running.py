@@ -1,0 +1,247 @@
+"""One picture after the other into the system, and what became of each."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.datasets.sequences import Image, Sequence
+from vslam_ref.systems.ptam.ptam import Outcome, Ptam
+from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.ptam.start import Attempt
+from vslam_ref.systems.ptam.tracker.tracker import Tracked
+
+UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
+STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)
+"""No picture; no map yet; the picture that made the map; and the qualities of tracking."""
+
+
+class Marks(NamedTuple):
+    """Points that were followed in a picture, to be drawn into it.
+
+    Attributes
+    ----------
+    uv : ndarray of float32, shape (n, 2)
+        Pixels of level 0.
+    level : ndarray of uint8, shape (n,)
+    first : ndarray of float32, shape (n, 2), or None
+        Before there is a map: where the points were in the first picture.
+    """
+
+    uv: NDArray[np.float32]
+    level: NDArray[np.uint8]
+    first: NDArray[np.float32] | None = None
+
+
+NOTHING = Marks(np.zeros((0, 2), np.float32), np.zeros(0, np.uint8))
+
+
+class Frame(NamedTuple):
+    """What became of one picture.
+
+    Attributes
+    ----------
+    number : int
+        In its source.
+    time : float
+        Seconds, by the sequence.
+    state : str
+        One of ``STATES``.
+    way : str
+        How the pose was found.
+    tried, found : int
+        Points looked for, and found with weight.
+    sigma : float
+        Scale of the errors, pixels of the point's level; NaN where there is no pose.
+    seconds : float
+        That the system took.
+    keyframe : bool
+    marks : Marks
+    """
+
+    number: int
+    time: float
+    state: str
+    way: str = ""
+    tried: int = 0
+    found: int = 0
+    sigma: float = np.nan
+    seconds: float = np.nan
+    keyframe: bool = False
+    marks: Marks = NOTHING
+
+
+@dataclass
+class Run:
+    """A run, to its end or as far as it came.
+
+    Attributes
+    ----------
+    sequence : Sequence
+    settings : Settings
+    system : Ptam
+    frames : list of Frame
+    start : Attempt or None
+        Of the two pictures that made the map.
+    refusals : Counter
+        Why there was no start: reason with its numbers taken out -> how often.
+    examples : dict
+        The same -> the last reason of the kind as it was told.
+    finish_seconds : float
+        Of the last adjustment.
+    interrupted : bool
+        Whether the run, or its film, was ended before its time.
+    filmed : int or None
+        Pictures of the film; None without one.
+    """
+
+    sequence: Sequence
+    settings: Settings
+    system: Ptam
+    frames: list[Frame] = field(default_factory=list)
+    start: Attempt | None = None
+    refusals: Counter[str] = field(default_factory=Counter)
+    examples: dict[str, str] = field(default_factory=dict)
+    finish_seconds: float = 0.0
+    interrupted: bool = False
+    filmed: int | None = None
+
+    def refused(self, reason: str) -> None:
+        """Count a reason why there is no map yet."""
+        kind = re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "…", reason)
+        self.refusals[kind] += 1
+        self.examples[kind] = reason
+
+    def no_start(self) -> str | None:
+        """Why there is no map, by the most frequent reason; None if there is one."""
+        if self.system.map is not None:
+            return None
+        if not self.refusals:
+            return "no picture could be looked at" if not self._looked_at() else "one picture is no start"
+        kind, count = self.refusals.most_common(1)[0]
+        return f"{self.examples[kind]} (so at {count} of {self.refusals.total()} pictures)"
+
+    def _looked_at(self) -> int:
+        return sum(frame.state != UNUSABLE for frame in self.frames)
+
+
+def run(
+    sequence: Sequence,
+    settings: Settings,
+    stop: Callable[[], bool] = lambda: False,
+    progress: Callable[[], object] = lambda: None,
+) -> Run:
+    """Run PTAM over a sequence.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        With a camera.
+    settings : Settings
+    stop : callable
+        Asked before each picture; true ends the run there.
+    progress : callable
+        Called after each picture.
+
+    Raises
+    ------
+    ValueError
+        If the sequence has no camera.
+    """
+    if sequence.camera is None:
+        raise ValueError(f"{sequence.name} has no camera: need one")
+    done = Run(sequence, settings, Ptam(sequence.camera, settings))
+    for image in sequence:
+        if stop():
+            done.interrupted = True
+            break
+        done.frames.append(_one(done, image))
+        progress()
+    began = time.perf_counter()
+    done.system.finish()
+    done.finish_seconds = time.perf_counter() - began
+    return done
+
+
+def _one(done: Run, image: Image) -> Frame:
+    """Give one picture to the system."""
+    if image.grey is None:
+        return Frame(image.number, image.time, UNUSABLE)
+    had_map, before = done.system.map is not None, done.system.trails
+    began = time.perf_counter()
+    outcome = done.system.step(image.number, image.grey)
+    seconds = time.perf_counter() - began
+    frame = Frame(image.number, image.time, WAITING, seconds=seconds)
+    if outcome.tracked is not None:
+        return _tracked(frame, outcome, outcome.tracked)
+    if not had_map and done.system.map is not None and isinstance(outcome.attempt, Attempt):
+        done.start = outcome.attempt
+        return frame._replace(state=START, keyframe=True, marks=_start_marks(outcome.attempt))
+    return _waited(done, frame, outcome, 0 if before is None else len(before.pictures))
+
+
+def _tracked(frame: Frame, outcome: Outcome, tracked: Tracked) -> Frame:
+    fine = tracked.fine
+    state = tracked.quality.value
+    if state == LOST:
+        return frame._replace(state=state, way=tracked.way, tried=len(fine.seen.point))
+    held = fine.weights > 0
+    marks = Marks(fine.uv[held].astype(np.float32), fine.seen.level[held].astype(np.uint8))
+    return frame._replace(
+        state=state,
+        way=tracked.way,
+        tried=len(fine.seen.point),
+        found=int(held.sum()),
+        sigma=float(tracked.pose.sigma),
+        keyframe=outcome.mapped is not None,
+        marks=marks,
+    )
+
+
+def _start_marks(attempt: Attempt) -> Marks:
+    good = attempt.good
+    uv, first = (values[good].astype(np.float32) for values in (attempt.uv_b, attempt.uv_a))
+    return Marks(uv, attempt.level[good].astype(np.uint8), first)
+
+
+def _waited(done: Run, frame: Frame, outcome: Outcome, before: int) -> Frame:
+    """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
+    trails, start = done.system.trails, done.settings.start
+    if isinstance(outcome.attempt, Attempt):
+        done.refused(outcome.attempt.reason)
+    elif outcome.attempt is not None:
+        done.refused(outcome.attempt)
+    if trails is None or len(trails.pictures) < 2:
+        count = 0 if trails is None else len(trails.now)
+        if count < start.least_trails:
+            done.refused(f"{count} corners in a picture: need {start.least_trails}")
+        elif 0 < before < start.patience:
+            done.refused("too few corners were found again in the next picture: begun anew")
+        return frame
+    if outcome.attempt is None and trails.length < start.least_motion:
+        moved = f"corners moved by {trails.length:.2f} px (median)"
+        done.refused(f"{moved}: a start is tried from {start.least_motion:g} px on")
+    elif outcome.attempt is None:
+        done.refused("corners were followed over too few pictures")
+    marks = Marks(
+        trails.now.astype(np.float32), trails.level.astype(np.uint8), trails.first.astype(np.float32)
+    )
+    return frame._replace(tried=len(trails.now), marks=marks)
+
+
+def path(run: Run, live: bool = False) -> tuple[IntArray, Array]:
+    """Numbers (n,) of pictures with a pose, and ``T_cam_world`` (n, 4, 4); ``live``: as they were told."""
+    if not live:
+        numbers, T = run.system.trajectory()
+        return numbers.astype(np.int64), T
+    told = [pose for _, pose in sorted(run.system.poses.items()) if pose.live is not None]
+    T = np.stack([pose.live for pose in told if pose.live is not None]) if told else np.zeros((0, 4, 4))
+    return np.array([pose.number for pose in told], np.int64), T
