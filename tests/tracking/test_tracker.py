@@ -15,9 +15,9 @@ from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracker
 from vslam_ref.systems.visual_map import Looks, visible
 
-NEAR = 2e-3
+NEAR = 5e-4
 """Metres and radians.  A picture of 160 pixels, f = 128: 0.2 px of a place, over the root of 100 places,
-is 0.02 px, 2e-4 radians; times ten for slanted patches and for motions that look alike."""
+is 0.02 px, 1.6e-4 radians, at 0.6 metres 1e-4 metres; times three, since some motions look alike."""
 
 
 def tracker(desk: Desk, k: int, velocity: Array | None = None) -> Tracker:

@@ -36,7 +36,7 @@ def on_plane(camera: Camera, uv: Array) -> Array:
 
 @pytest.mark.parametrize("camera", CAMERAS, ids=["pinhole", "fov"])
 def test_it_is_the_derivative_of_the_map_from_pixel_to_plane_to_pixel(camera: Camera) -> None:
-    """Central differences, h = 1e-3 pixels: h^2 of third derivatives below 1e-3, and 1e-13 / h of rounding."""
+    """Central differences, h = 1e-3 pixels: h^2 of third derivatives below 1e-3; rounding: 1e-13 / h."""
     made, h = a_map(camera), 1e-3
     seen = visible(made, T_CAM)
     uv = made.points["source_uv"][seen.point]

@@ -19,7 +19,10 @@ class Quality(Enum):
 
 
 def quality(fine: Pass, settings: TrackerSettings) -> Quality:
-    """Judge the fine pass: how many were found of those tried, how many agree, and how well."""
+    """Judge the fine pass: how many were found of those tried, how many agree, and how well.
+
+    Implements :eq:`eq-quality`, the frame that is rejected in A§2.2.1.
+    """
     if fine.pose.reason or fine.inliers < settings.least_inliers or fine.pose.sigma > settings.worst_sigma:
         return Quality.LOST
     held = fine.weights > 0

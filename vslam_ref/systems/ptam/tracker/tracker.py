@@ -62,7 +62,10 @@ class Tracker:
         return Looks(f.limit, f.measure, f.absolute, f.first_refine)
 
     def track(self, visual_map: VisualMap, picture: Picture) -> Tracked:
-        """Find the pose of the next picture; the map is only read."""
+        """Find the pose of the next picture; the map is only read.
+
+        Implements A§2.2.1, tracking in two passes.
+        """
         found = self._predicted(visual_map, picture) if self.lost == 0 else None
         if (found is None or found.quality is Quality.LOST) and self.settings.tracker.follow:
             found = self._recovered(visual_map, picture) or found
