@@ -43,7 +43,7 @@ def weights_figure(loss: Loss, size: ArrayLike, wrong: ArrayLike) -> Figure:
     line = np.linspace(0, 12, 400)
     with style.house_style():
         figure, (axes,) = style.new_figure(3.2)
-        bins = np.linspace(0, 12, 49)
+        bins = np.linspace(0, 12, 49).tolist()
         parts = [np.minimum(x[~bad], 12), np.minimum(x[bad], 12)]
         axes.hist(
             parts,
@@ -52,7 +52,7 @@ def weights_figure(loss: Loss, size: ArrayLike, wrong: ArrayLike) -> Figure:
             color=[style.SKY, style.VERMILION],
             label=["right", "wrong (12 or more)"],
         )
-        axes.set(xlabel=r"error $\|e\|/(\sigma_j\,\sigma_T)$", ylabel="matches")
+        axes.set(xlabel=r"error $\|e\|/\sigma_j$ in units of the scale $\hat\sigma$", ylabel="matches")
         right = axes.twinx()
         right.plot(line, loss.weight(line), color=style.BLACK, label="Tukey's weight (right axis)")
         right.set(ylim=(0, 1.05), ylabel="weight")

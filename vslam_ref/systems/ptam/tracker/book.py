@@ -148,8 +148,8 @@ def tukey_step(camera: Camera, matches: list[Match], T: Array) -> tuple[Array, l
         e.append((at.uv - m.u) / m.s)  # eq-a2-7
         J.append(at.J_pose / m.s)
     x = [float(np.hypot(*e_j)) for e_j in e]
-    sigma_T = max(MAD_NORM_2D * float(np.median(x)), 0.4)  # eq-mad-norm
-    w = [(1 - (x_j / (C * sigma_T)) ** 2) ** 2 if x_j < C * sigma_T else 0.0 for x_j in x]  # eq-a2-8
+    sigma_T = C * max(MAD_NORM_2D * float(np.median(x)), 0.4)  # eq-mad-norm
+    w = [(1 - (x_j / sigma_T) ** 2) ** 2 if x_j < sigma_T else 0.0 for x_j in x]  # eq-a2-8
     H, g = np.zeros((6, 6)), np.zeros(6)
     for e_j, J_j, w_j in zip(e, J, w, strict=True):
         H += w_j * J_j.T @ J_j  # eq-track-normal
