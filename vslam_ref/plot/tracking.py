@@ -50,15 +50,18 @@ def weights_figure(loss: Loss, size: ArrayLike, wrong: ArrayLike) -> Figure:
             bins,
             stacked=True,
             color=[style.SKY, style.VERMILION],
-            label=["right", "wrong (12 or more)"],
+            label=["right", "wrong"],
         )
-        axes.set(xlabel=r"error $\|e\|/\sigma_j$ in units of the scale $\hat\sigma$", ylabel="matches")
+        axes.set(
+            xlabel=r"error $\|e\|/\sigma_j$ in units of the scale $\hat\sigma$; the last bar holds all from 12 on",
+            ylabel="matches",
+        )
         right = axes.twinx()
         right.plot(line, loss.weight(line), color=style.BLACK, label="Tukey's weight (right axis)")
         right.set(ylim=(0, 1.05), ylabel="weight")
         right.grid(False)
         handles = [axes.get_legend_handles_labels(), right.get_legend_handles_labels()]
-        axes.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper right")
+        axes.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center")
     return figure
 
 
