@@ -53,7 +53,7 @@ def weights_figure(loss: Loss, size: ArrayLike, wrong: ArrayLike) -> Figure:
             label=["right", "wrong"],
         )
         axes.set(
-            xlabel=r"error $\|e\|/\sigma_j$ in units of the scale $\hat\sigma$; the last bar holds all from 12 on",
+            xlabel=r"error $\|e\|/\sigma_j$ in units of the scale $\hat\sigma$ (last bar: 12 and more)",
             ylabel="matches",
         )
         right = axes.twinx()
