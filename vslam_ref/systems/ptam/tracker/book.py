@@ -19,7 +19,7 @@ C = tuned("tukey", 2).c
 
 
 class Point(NamedTuple):
-    """Point X (3,) of the map; pose, pyramid, level and pixel u (2,) of level 0 where it was first seen."""
+    """Point X (3,) of the map; T_kf_world (4, 4), pyramid, level and pixel u (2,) of its first picture."""
 
     X: Array
     T_kf_world: Array
@@ -45,8 +45,11 @@ class Match(NamedTuple):
     s: float
 
 
+# --- what should be seen ---
+
+
 def on_level(u: Array, level: int) -> Array:
-    """From pixels of level 0 to those of a level."""
+    """From pixels u (2,) of level 0 to those of a level."""
     there: Array = (u - (2**level - 1) / 2) / 2**level  # eq-level-position
     return there
 
@@ -61,7 +64,7 @@ def affine(camera: Camera, p: Point, T: Array) -> Array:
 
 
 def level_for(A: Array, source: int) -> int:
-    """Level on which a pixel of the source's level covers at most three; -1 if too small or too large."""
+    """Level where a pixel of the source, through A (2, 2), covers three pixels at most; -1 without one."""
     area = np.linalg.det(A * 2**source)
     if area < 0.25:
         return -1
@@ -72,7 +75,10 @@ def level_for(A: Array, source: int) -> int:
 
 
 def visible(camera: Camera, points: list[Point], T: Array, picture: Picture) -> list[Seen]:
-    """Points that a camera at T should see, at least 5 pixels of their level inside the picture."""
+    """Points that a camera at T (4, 4) should see, at least 5 pixels of their level inside.
+
+    Implements :eq:`eq-search-level` and :eq:`eq-patch-affine`.
+    """
     seen = []
     for p in points:
         at = camera.project(se3.act(T, p.X))
@@ -95,14 +101,17 @@ def template(seen: Seen) -> Bytes:
     return warped_patch(p.images[p.level], on_level(p.u, p.level), M)
 
 
+# --- where it is ---
+
+
 def inside(image: Bytes, u: Array, before: int, after: int) -> bool:
-    """Whether a window around u lies within the image."""
+    """Whether a window of pixels around u (2,) lies within the image."""
     end = np.array(image.shape[::-1]) - 1
     return bool((u >= before).all() and (u + after <= end).all())
 
 
 def refined(image: Bytes, T: Bytes, u: Array) -> Array | None:
-    """Place where a patch fits best, from u on; None if it is lost on the way or looks different there."""
+    """Place in pixels where a patch fits best, from u (2,) on; None if lost or unlike on the way."""
     place, b = u, 0.0
     for _ in range(10):
         if not inside(image, place, 3, 2):
@@ -123,13 +132,13 @@ def unlike(T: Bytes, patch: Bytes) -> float:
 
 
 def from_corner(image: Bytes, T: Bytes, corner: tuple[int, int]) -> Array | None:
-    """Place refined from a corner, if the patch around the corner is alike."""
+    """Place (2,), in pixels, refined from a corner, if the patch around the corner is alike."""
     start = np.array(corner, float)
     return refined(image, T, start) if unlike(T, warped_patch(image, start, np.eye(2))) <= 0.5 else None
 
 
 def find(seen: Seen, picture: Picture, radius: float) -> Array | None:
-    """Pixel (2,) of level 0: refined from where it is expected, else from the corner most alike."""
+    """Place (2,), pixels of level 0: refined from where it is expected, else from the corner most alike."""
     image, corners = picture.levels[seen.level], picture.corners[seen.level].xy
     T, u, reach = template(seen), on_level(seen.u, seen.level), max(radius / 2**seen.level, 1.5)
     place = refined(image, T, u)
@@ -140,8 +149,11 @@ def find(seen: Seen, picture: Picture, radius: float) -> Array | None:
     return None if place is None else 2**seen.level * place + (2**seen.level - 1) / 2  # eq-level-position
 
 
+# --- the pose ---
+
+
 def tukey_step(camera: Camera, matches: list[Match], T: Array) -> tuple[Array, list[float]]:
-    """Pose after one reweighted step from T, and the weights that it used."""
+    """Pose T (4, 4), metres and radians, after one reweighted step, and the weights that it used."""
     e, J = [], []
     for m in matches:
         at = camera.pixel_from_world_with_jacobians(T, m.X)
@@ -156,6 +168,9 @@ def tukey_step(camera: Camera, matches: list[Match], T: Array) -> tuple[Array, l
         g += w_j * J_j.T @ e_j
     mu = -np.linalg.solve(H, g)
     return se3.exp(mu) @ T, w  # eq-a2-5
+
+
+# --- the two passes ---
 
 
 def choose(seen: list[Seen], most: int, coarse: bool, rng: np.random.Generator) -> list[Seen]:
@@ -179,7 +194,7 @@ def quality(weights: list[float], levels: list[int]) -> str:
 def track(
     camera: Camera, points: list[Point], picture: Picture, T_last: Array, v: Array, rng: np.random.Generator
 ) -> tuple[Array, str]:
-    """Pose of the next picture, from the last pose and the velocity v (6,), and what it is worth."""
+    """Pose of the next picture and its worth, from T_last (4, 4) and v (6,), metres and radians."""
     T = se3.exp(v) @ T_last  # eq-a2-5
     for most, radius, coarse in ((60, 10.0, True), (1000, 5.0, False)):
         seen = choose(visible(camera, points, T, picture), most, coarse, rng)

@@ -34,6 +34,6 @@ def quality(fine: Pass, settings: TrackerSettings) -> Quality:
 
 
 def found_per_level(fine: Pass, levels: int) -> np.ndarray:
-    """Points tried and found on each level, (levels, 2)."""
+    """Points tried and found on each level, (levels, 2): counts, no unit."""
     tried = np.bincount(fine.seen.level, minlength=levels)
     return np.stack([tried, np.bincount(fine.seen.level[fine.weights > 0], minlength=levels)], 1)

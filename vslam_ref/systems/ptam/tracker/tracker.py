@@ -25,6 +25,7 @@ class Tracked(NamedTuple):
     Attributes
     ----------
     T_cam_world : ndarray, shape (4, 4)
+        World to camera, in the map's unit of length, which is metres only if the map is.
     quality : Quality
     fine : Pass
         With the points that were looked for.
@@ -45,7 +46,7 @@ class Tracked(NamedTuple):
 
 @dataclass
 class Tracker:
-    """What the tracker remembers from picture to picture."""
+    """What the tracker remembers; T_last (4, 4) is the last pose, in the map's own metres."""
 
     settings: Settings
     rng: np.random.Generator
