@@ -1,4 +1,4 @@
-"""Vectors of chapters 01 to 06, 08, 09, 23: a plain program passes, each known mistake is told by name."""
+"""Vectors of chapters 01 to 06, 08 to 10, 23: a plain program passes, every known mistake is told by name."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import plain_cameras
 import plain_estimates
 import plain_features
 import plain_motions
+import plain_tracking
 import plain_two_views
 import plain_views
 import pytest
@@ -29,9 +30,12 @@ PROGRAM: dict[str, Callable[..., Any]] = {
     **plain_estimates.PROGRAM,
     **plain_views.PROGRAM,
     **plain_features.PROGRAM,
+    **plain_tracking.PROGRAM,
     **plain_two_views.PROGRAM,
 }
-FILES = [name for name in form.names() if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "23")]
+FILES = [
+    name for name in form.names() if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "23")
+]
 MISTAKES = mistakes(FILES)
 
 
@@ -52,7 +56,7 @@ def test_all_topics_are_there() -> None:
     topics = {name.partition("/")[2].removesuffix(".json") for name in FILES}
     assert topics >= {
         *("multiview", "so2", "se2", "so3", "quaternion", "se3", "sim3", "camera", "loss", "scale", "noise"),
-        *("least_squares", "bundle", "trajectory", "format", "features", "two_views"),
+        *("least_squares", "bundle", "trajectory", "format", "features", "two_views", "tracking"),
     }
 
 

@@ -25,7 +25,7 @@ MARGIN = 5.0
 
 
 class Sources(NamedTuple):
-    """Where points were first seen: keyframe, level, pixel (n, 2), d xn / d pixel (n, 2, 2), depth."""
+    """Where points were first seen: kf (n,), level (n,), pixel uv (n, 2), slope (n, 2, 2) and depth (n,)."""
 
     kf: IntArray
     level: IntArray
@@ -75,11 +75,13 @@ class Visible(NamedTuple):
 def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | None = None) -> Visible:
     """Points that a camera at a pose should see.
 
+    Implements :eq:`eq-patch-affine` and :eq:`eq-search-level` for all points at once.
+
     Parameters
     ----------
     visual_map : VisualMap
     T_cam_world : array_like, shape (4, 4)
-    points : array_like of int, optional
+    points : array_like of int, shape (m,), optional
         Ask these only; all that are alive by default.
 
     Returns
@@ -127,7 +129,10 @@ def affine(visual_map: VisualMap, origin: Sources, T_cam_world: Array, J_point: 
 
 
 def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray) -> Templates:
-    """Patches (n, 8, 8) as the levels (n,) on which they are looked for should show them."""
+    """Patches (n, 8, 8) as the levels (n,) on which they are looked for should show them.
+
+    Implements :eq:`eq-sampling` and :eq:`eq-warp` with the keyframes of a map.
+    """
     at = level_from_finest(origin.uv, origin.level)
     M = sampling(A, level, origin.level)
     patch = np.zeros((len(at), BEFORE + AFTER + 1, BEFORE + AFTER + 1), np.uint8)

@@ -51,7 +51,10 @@ def coarse(
     looks: Looks,
     rng: np.random.Generator,
 ) -> Pass:
-    """Look for a few points of the coarsest levels around where a guess puts them, and improve the guess."""
+    """Look for a few points of the coarsest levels around where a guess puts them, and improve the guess.
+
+    ``T_guess`` is (4, 4), ``radius`` in pixels of level 0.
+    """
     seen = visible(visual_map, T_guess)
     chosen = _coarsest(seen.level, settings.coarse_points, rng)
     return _pass(visual_map, picture, T_guess, seen.only(chosen), radius, settings, looks)
@@ -66,7 +69,10 @@ def fine(
     looks: Looks,
     rng: np.random.Generator,
 ) -> Pass:
-    """Look for all visible points, or as many as are allowed, near where they should be."""
+    """Look for all visible points, or as many as are allowed, near where they should be.
+
+    ``T_guess`` is (4, 4), ``radius`` in pixels of level 0.
+    """
     seen = visible(visual_map, T_guess)
     if len(seen.point) > settings.fine_points:
         chosen = rng.permutation(len(seen.point))[: settings.fine_points]

@@ -19,7 +19,10 @@ class Quality(Enum):
 
 
 def quality(fine: Pass, settings: TrackerSettings) -> Quality:
-    """Judge the fine pass: how many were found of those tried, how many agree, and how well."""
+    """Judge the fine pass: how many were found of those tried, how many agree, and how well.
+
+    Implements :eq:`eq-quality`, the frame that is rejected in A§2.2.1.
+    """
     if fine.pose.reason or fine.inliers < settings.least_inliers or fine.pose.sigma > settings.worst_sigma:
         return Quality.LOST
     held = fine.weights > 0
@@ -31,6 +34,6 @@ def quality(fine: Pass, settings: TrackerSettings) -> Quality:
 
 
 def found_per_level(fine: Pass, levels: int) -> np.ndarray:
-    """Points tried and found on each level, (levels, 2)."""
+    """Points tried and found on each level, (levels, 2): counts, no unit."""
     tried = np.bincount(fine.seen.level, minlength=levels)
     return np.stack([tried, np.bincount(fine.seen.level[fine.weights > 0], minlength=levels)], 1)

@@ -26,14 +26,17 @@ class Known(NamedTuple):
 
 
 class Consensus(NamedTuple):
-    """Best pose of many draws and which matches agree with it (n,)."""
+    """Best T_cam_world (4, 4), metres, of many draws, and ok (n,): which matches agree with it."""
 
     T_cam_world: Array
     ok: BoolArray
 
 
 def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> Known:
-    """Follow points from one picture into another, each on its level; what was not found is left out."""
+    """Follow points from one picture into another, each on its level; what was not found is left out.
+
+    The radius is in pixels of level 0, but 4 of the level at least.
+    """
     place, ok = known.uv.copy(), np.zeros(len(known.point), np.bool_)
     for level in range(len(now.levels)):
         rows = np.flatnonzero(known.level == level)
@@ -50,7 +53,10 @@ def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> 
 def by_three_points(
     camera: Camera, X_world: Array, known: Known, rng: np.random.Generator, draws: int = DRAWS
 ) -> Consensus | None:
-    """Pose from three matches with which most of all agree; None if fewer than eight do."""
+    """Pose from three matches with which most of all agree; None if fewer than eight do.
+
+    Implements :eq:`eq-recover-cost`, the least of many draws of three; ``X_world`` is (n, 3), metres.
+    """
     rays = camera.unproject(known.uv)
     use = np.flatnonzero(rays.valid)
     if len(use) < 8:
@@ -85,7 +91,10 @@ def picture_of(visual_map: VisualMap, kf: int) -> Picture:
 
 
 def most_alike(visual_map: VisualMap, picture: Picture, count: int) -> IntArray:
-    """Keyframes whose small images differ least, without their means."""
+    """Keyframes whose small images differ least, without their means.
+
+    Implements :eq:`eq-most-alike`, in grey levels squared; the count has no unit.
+    """
     here = picture.small.value - picture.small.value.mean()
     others = np.stack([small.value - small.value.mean() for small in visual_map.small])
     order: IntArray = np.argsort(((others - here) ** 2).sum((1, 2)), kind="stable")

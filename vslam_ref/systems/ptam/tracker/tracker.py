@@ -25,6 +25,7 @@ class Tracked(NamedTuple):
     Attributes
     ----------
     T_cam_world : ndarray, shape (4, 4)
+        World to camera, in the map's unit of length, which is metres only if the map is.
     quality : Quality
     fine : Pass
         With the points that were looked for.
@@ -45,7 +46,7 @@ class Tracked(NamedTuple):
 
 @dataclass
 class Tracker:
-    """What the tracker remembers from picture to picture."""
+    """What the tracker remembers; T_last (4, 4) is the last pose, in the map's own metres."""
 
     settings: Settings
     rng: np.random.Generator
@@ -62,7 +63,10 @@ class Tracker:
         return Looks(f.limit, f.measure, f.absolute, f.first_refine)
 
     def track(self, visual_map: VisualMap, picture: Picture) -> Tracked:
-        """Find the pose of the next picture; the map is only read."""
+        """Find the pose of the next picture; the map is only read.
+
+        Implements A§2.2.1, tracking in two passes.
+        """
         found = self._predicted(visual_map, picture) if self.lost == 0 else None
         if (found is None or found.quality is Quality.LOST) and self.settings.tracker.follow:
             found = self._recovered(visual_map, picture) or found
