@@ -133,10 +133,13 @@ def _near_curve(
 
 
 def ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
-    """Distances (n, 2) along both rays of where they come closest; infinite, with a sign, if parallel."""
+    """Distances (n, 2) along both rays of where they come closest; of no meaning if these are parallel.
+
+    Implements :eq:`eq-ray-depths`.
+    """
     ra = a @ se3.rotation(T_b_a).T
     t = se3.translation(T_b_a)
     c = np.einsum("ni,ni->n", ra, b)
     p, q = ra @ t, b @ t
     under = np.maximum(1.0 - c * c, 1e-12)
-    return np.stack([(c * q - p) / under, (q - c * p) / under], 1)
+    return np.stack([(c * q - p) / under, (q - c * p) / under], 1)  # eq-ray-depths
