@@ -99,7 +99,8 @@ def test_a_look_alike_on_the_line_is_refused_by_the_way_back(search_back: bool, 
     """Repeated texture: a spot that b does not show finds its twin, on its line, at a possible depth.
 
     Points move to the right along their rows.  The twin moved by 5 px; the match of the hidden spot says
-    55 px and fits both views to the pixel.  Searched back, the twin finds itself, which is a little more alike.
+    55 px and fits both views to the pixel.
+    Searched back, the twin finds itself, which is a little more alike.
     """
     camera = Pinhole(200.0, 200.0, 79.5, 49.5)
     T_b_a = se3.from_rt(np.eye(3), np.array([0.5, 0.0, 0.0]))
