@@ -54,20 +54,21 @@ def test_rays_that_pass_each_other(answer: ModuleType) -> None:
 
 
 def meeting(r_a: float, centre_b: Array, turn_a: float, turn_b: float) -> float:
-    """Distance along a's ray, in a plane: by the law of sines, each ray turned by a small angle."""
-    point = np.array([0.0, r_a])
-    base = np.linalg.norm(centre_b)
-    along = np.arctan2(*(centre_b[::-1]))
-    at_a = along - np.pi / 2 - turn_a
-    d = point - centre_b
-    at_b = np.arctan2(d[1], d[0]) + turn_b - (along + np.pi)
-    return float(base * np.sin(at_b) / np.sin(at_a - at_b + np.pi))
+    """Distance along a's ray at which two lines of a plane (x, z) cross, each turned by a small angle."""
+
+    def turned(v: Array, angle: float) -> Array:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1]])
+
+    u = turned(np.array([0.0, 1.0]), turn_a)
+    v = turned(np.array([0.0, r_a]) - centre_b, turn_b)
+    return float((centre_b[0] * v[1] - centre_b[1] * v[0]) / (u[0] * v[1] - u[1] * v[0]))
 
 
 @pytest.mark.parametrize("r_a", [0.8, 2.0, 7.0])
 @pytest.mark.parametrize("centre", [[0.5, 0.1], [0.3, -0.4], [1.5, 0.9]])
 def test_the_sigma_is_that_of_two_turned_rays(answer: ModuleType, r_a: float, centre: list[float]) -> None:
-    """Derivatives of the law of sines by differences of 1e-5: good to 1e-6 of themselves."""
+    """Derivatives of where two lines cross, by differences of 1e-5: good to 1e-6 of themselves."""
     centre_b, h = np.array(centre), 1e-5
     slope_a = (meeting(r_a, centre_b, h, 0) - meeting(r_a, centre_b, -h, 0)) / (2 * h)
     slope_b = (meeting(r_a, centre_b, 0, h) - meeting(r_a, centre_b, 0, -h)) / (2 * h)

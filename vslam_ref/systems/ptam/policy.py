@@ -15,7 +15,10 @@ from vslam_ref.systems.visual_map import VisualMap
 
 @dataclass
 class KeyframePolicy:
-    """Time, distance and quality, as A§2.2.2.1 says; and never starve the map."""
+    """Time, distance and quality; and never starve the map.
+
+    Implements A§2.2.2.1, the choice of keyframes.
+    """
 
     settings: KeyframeSettings
     since: int = 0

@@ -32,7 +32,10 @@ def look_in_neighbours(
 
 
 def seldom_found(visual_map: VisualMap, tries: int, share: float) -> IntArray:
-    """Points that were looked for often and found too seldom."""
+    """Points that were looked for often and found too seldom.
+
+    Implements :eq:`eq-seldom-found`.
+    """
     table = visual_map.points
     often = table["alive"] & (table["tried"] >= tries)
     return np.flatnonzero(often & (table["found"] < share * table["tried"]))

@@ -63,6 +63,8 @@ def new_points(
 ) -> IntArray:
     """Add points that the newest keyframe is the first to explain; return their numbers (n,).
 
+    Implements A§2.2.2.1, the new points.
+
     Parameters
     ----------
     visual_map : VisualMap
@@ -132,6 +134,8 @@ def match(
     camera: Camera, xy: Pixels, a: Side, b: Side, near: float, s: MapperSettings, f: FeatureSettings
 ) -> Pairs:
     """Corners (n, 2) of a in b: on their curve, refined, and found back in a.
+
+    Implements :eq:`eq-search-back`.
 
     Parameters
     ----------
