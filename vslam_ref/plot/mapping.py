@@ -42,7 +42,7 @@ def misses_figure(errors: Mapping[str, ArrayLike], wrong: Mapping[str, ArrayLike
     """Reprojection errors of right and of wrong matches in their two views."""
     with style.house_style():
         figure, panels = style.new_figure(3.0, len(errors))
-        bins = np.linspace(0, limit, 21)
+        bins = np.linspace(0, limit, 21).tolist()
         for axes, (name, error) in zip(panels, errors.items(), strict=True):
             bad = np.asarray(wrong[name], dtype=bool)
             each = [np.minimum(np.asarray(error)[rows], limit) for rows in (~bad, bad)]

@@ -25,7 +25,11 @@ MARGIN = 5.0
 
 
 class Sources(NamedTuple):
-    """Where points were first seen: keyframe, level, pixel (n, 2), d xn / d pixel (n, 2, 2), depth."""
+    """Where points were first seen.
+
+    Keyframe ``kf (n,)``, ``level (n,)``, pixel ``uv (n, 2)``, d xn / d pixel ``slope (n, 2, 2)``, and
+    ``depth (n,)``.
+    """
 
     kf: IntArray
     level: IntArray
@@ -79,7 +83,7 @@ def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | N
     ----------
     visual_map : VisualMap
     T_cam_world : array_like, shape (4, 4)
-    points : array_like of int, optional
+    points : array_like of int, shape (n,), optional
         Ask these only; all that are alive by default.
 
     Returns
@@ -127,7 +131,10 @@ def affine(visual_map: VisualMap, origin: Sources, T_cam_world: Array, J_point: 
 
 
 def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray) -> Templates:
-    """Patches (n, 8, 8) as the levels (n,) on which they are looked for should show them."""
+    """Patches (n, 8, 8) as the levels (n,) on which they are looked for should show them.
+
+    Implements :eq:`eq-sampling` and :eq:`eq-warp`, with all images of a level at once.
+    """
     at = level_from_finest(origin.uv, origin.level)
     M = sampling(A, level, origin.level)
     patch = np.zeros((len(at), BEFORE + AFTER + 1, BEFORE + AFTER + 1), np.uint8)

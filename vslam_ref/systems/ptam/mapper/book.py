@@ -1,6 +1,8 @@
 """Mapping in plain loops: one keyframe, one corner, its curve, one match, one point, as chapter 11 reads it.
 
-Pixels are of level 0 unless a name says otherwise; ``a`` is the new keyframe, ``b`` the one beside it.
+Pixels ``u_a (2,)``, ``u_b (2,)`` are of level 0 unless a name says otherwise; ``a`` is the new keyframe and
+``b`` the one beside it; ``T_b_a (4, 4)`` maps points of a's frame to b's.  Bearings ``bearing_a (3,)``,
+``a (3,)``, ``b (3,)`` have length 1; lengths have the map's own unit.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ def wants_keyframe(now: Now, s: KeyframeSettings) -> bool:
 
 
 def is_free(corner: Corner, seen: list[Array], spacing: float) -> bool:
-    """Whether no point that the keyframe sees already lies near a corner; pixels of the corner's level."""
+    """Whether no point (2,) that the keyframe sees lies near a corner; pixels of the corner's level."""
     return all(np.hypot(*(np.array(corner) - uv)) >= spacing for uv in seen)
 
 
@@ -59,7 +61,7 @@ def curve_distance(camera: Camera, bearing_a: Array, u_b: Array, T_b_a: Array) -
 
 
 def ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
-    """Distances (2,) along the bearings a and b (3,) of where they come closest: q b - p R a = t."""
+    """Distances (2,) along both bearings of where they come closest, in a unit of t: q b - p R a = t."""
     M = np.stack([-T_b_a[:3, :3] @ a, b], 1)
     return np.asarray(np.linalg.solve(M.T @ M, M.T @ T_b_a[:3, 3]))  # eq-ray-depths
 
@@ -88,12 +90,12 @@ def patch_at(image: Bytes, corner: Corner) -> Bytes:
 
 
 def level_zero(corner: Corner, level: int) -> Array:
-    """Pixel of level 0."""
+    """Position (2,) in pixels of level 0 of a pixel of a level."""
     return 2.0**level * np.array(corner) + (2.0**level - 1) / 2  # eq-level-position
 
 
 def best_on_curve(camera: Camera, corner: Corner, a: Side, b: Side, T_b_a: Array, gates: Gates) -> int:
-    """Number of the corner of b near the curve that looks most like a corner of a; -1 without one."""
+    """Number of the corner of b near the curve, most like a corner (pixels) of a; -1 without one."""
     T = patch_at(a.image, corner)
     bearing_a = camera.unproject(level_zero(corner, a.level)).bearing
     best, least = -1, np.inf
@@ -111,15 +113,19 @@ def best_on_curve(camera: Camera, corner: Corner, a: Side, b: Side, T_b_a: Array
 def comes_back(
     camera: Camera, corner: Corner, found: Corner, a: Side, b: Side, T_b_a: Array, gates: Gates
 ) -> bool:
-    """Whether the corner that was found in b, searched in a, is the corner from which the search began."""
-    home = best_on_curve(camera, found, b, a, np.linalg.inv(T_b_a), gates._replace(near=0.0))
+    """Whether the way back ends where the search began.
+
+    The corner that was found in b is searched in a; all in pixels of the level.
+    """
+    T_a_b = np.asarray(np.linalg.inv(T_b_a))
+    home = best_on_curve(camera, found, b, a, T_a_b, gates._replace(near=0.0))
     if home < 0:
         return False
     return float(np.hypot(*(np.array(a.corners[home]) - corner))) <= gates.back  # eq-search-back
 
 
 class Point(NamedTuple):
-    """A point in the frame of a (3,), its covariance (3, 3), and the standard deviation of its depth."""
+    """A point in the frame of a (3,), its covariance (3, 3), the sigma of its depth; the map's own unit."""
 
     X_a: Array
     cov: Array
@@ -127,7 +133,7 @@ class Point(NamedTuple):
 
 
 def triangulate(camera: Camera, u_a: Array, u_b: Array, T_b_a: Array, sigma: float) -> Point:
-    """Point with the smallest reprojection error: Gauss-Newton from where the rays come closest."""
+    """Point with the smallest reprojection error (pixels): Gauss-Newton from where the rays come closest."""
     a, b = camera.unproject(u_a).bearing, camera.unproject(u_b).bearing
     X = ray_depths(a, b, T_b_a)[0] * a
     R, t = T_b_a[:3, :3], T_b_a[:3, 3]
@@ -137,12 +143,12 @@ def triangulate(camera: Camera, u_a: Array, u_b: Array, T_b_a: Array, sigma: flo
         J = np.concatenate([at_a.J_point, at_b.J_point @ R]) / sigma
         H = J.T @ J
         X = X - np.linalg.solve(H, J.T @ r)
-    cov = np.linalg.inv(H)  # eq-triangulation-covariance
+    cov = np.asarray(np.linalg.inv(H))  # eq-triangulation-covariance
     return Point(X, cov, float(np.sqrt(a @ cov @ a)))
 
 
 def depth_sigma(depths: Array, parallax: float, eps_a: float, eps_b: float) -> float:
-    """Sigma of the distance along a's ray, from those of both bearings in their common plane, radians."""
+    """Sigma of the first of ``depths (2,)``, from those of both bearings in their common plane, radians."""
     moved_by_b = depths[1] * eps_b / np.sin(parallax)
     moved_by_a = depths[0] * eps_a * np.cos(parallax) / np.sin(parallax)
     return float(np.hypot(moved_by_a, moved_by_b))  # eq-depth-sigma
@@ -172,5 +178,5 @@ def local_part(seen: Seen, newest: int, count: int) -> Part:
 
 
 def dies(tried: int, found: int, tries: int, share: float) -> bool:
-    """Whether a point was looked for often enough and found too seldom."""
+    """Whether a point was looked for often enough and found in too small a share of the tries."""
     return tried >= tries and found < share * tried  # eq-seldom-found

@@ -41,7 +41,7 @@ class Corner(NamedTuple):
 
 
 class OnCurve(NamedTuple):
-    """Best corner of each point (n,), -1 without one, and its cost over the patch's variation."""
+    """Best ``corner (n,)`` of each point, -1 if none; ``cost (n,)`` over the patch's variation, no unit."""
 
     corner: IntArray
     cost: Array
@@ -133,7 +133,9 @@ def _near_curve(
 
 
 def ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
-    """Distances (n, 2) along both rays of where they come closest; of no meaning if these are parallel.
+    """Distances (n, 2) along rays ``a (n, 3)``, ``b (n, 3)`` of where they come closest.
+
+    In the unit of the translation of ``T_b_a (4, 4)``; without meaning if the rays are parallel.
 
     Implements :eq:`eq-ray-depths`.
     """
