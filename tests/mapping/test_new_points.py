@@ -62,6 +62,18 @@ def test_no_new_point_beside_a_known_one(wall: Any, pair: VisualMap, settings: S
     assert len(again) < 0.5 * len(numbers)
 
 
+def test_a_corner_becomes_one_point_though_two_neighbours_show_it(
+    wall: Any, pair: VisualMap, settings: Settings
+) -> None:
+    """Keyframe 2 is keyframe 0 once more: what was found in the one is not asked of the other."""
+    kf = pair.add_keyframe(wall.T_cam_world[0], wall.pictures[0])
+    pair.observe(kf, np.arange(6), 0, pair.points["source_uv"][:6].copy())
+    assert len(new_points.partners(pair, 1, settings.mapper.partners)) == 2
+    numbers = new_points.new_points(pair, 1, wall.pictures[1], settings.mapper, settings.features)
+    places = [tuple(row) for row in pair.points["source_uv"][numbers].tolist()]
+    assert len(set(places)) == len(places) > 60
+
+
 def test_without_a_base_line_there_are_no_points(wall: Any, settings: Settings) -> None:
     """The same picture twice from the same place: every ray is parallel to its partner."""
     made = VisualMap(wall.camera, wall.pictures[0].levels[0].shape)

@@ -70,7 +70,7 @@ def look(
         n points, where they are expected.
     picture : Picture
     radius : array_like, shape () or (n,)
-        Pixels of level 0.
+        In pixels of level 0.
     looks : Looks
 
     Returns

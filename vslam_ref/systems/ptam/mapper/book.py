@@ -86,7 +86,7 @@ class Gates(NamedTuple):
 def patch_at(image: Bytes, corner: Corner) -> Bytes:
     """Patch of 8 x 8 pixels around a corner; empty where it does not fit."""
     x, y = corner
-    return image[y - 4 : y + 4, x - 4 : x + 4] if min(x, y) >= 4 else image[:0]
+    return image[y - 4 : y + 4, x - 4 : x + 4] if min(x, y) >= 4 else image[:0]  # eq-warp: M = I
 
 
 def level_zero(corner: Corner, level: int) -> Array:
