@@ -62,7 +62,7 @@ CHAPTERS = (
     Chapter(8, "Image features", "From images to a map", "features", "08_features"),
     Chapter(9, "Two views", "From images to a map", "geometry/multiview/two_views", "09_two_views"),
     Chapter(10, "Tracking", "From images to a map", "systems/ptam/tracker", "10_tracking"),
-    Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper"),
+    Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper", "11_mapping"),
     Chapter(12, "PTAM", "From images to a map", "systems/ptam"),
     Chapter(13, "Pose graphs", "Closing loops", "estimation/posegraph"),
     Chapter(14, "ORB-SLAM", "Closing loops", "systems/orbslam"),

@@ -15,7 +15,10 @@ from vslam_ref.systems.visual_map import VisualMap
 
 @dataclass
 class KeyframePolicy:
-    """Time, distance and quality, as A§2.2.2.1 says; and never starve the map."""
+    """Time, distance and quality; and never starve the map.
+
+    Implements A§2.2.2.1, the choice of keyframes.
+    """
 
     settings: KeyframeSettings
     since: int = 0
@@ -41,7 +44,7 @@ class KeyframePolicy:
 
 
 def distance(visual_map: VisualMap, tracked: Tracked) -> float:
-    """Distance to the nearest keyframe over the median depth of the points that were seen."""
+    """Ratio of the distance to the nearest keyframe and the median depth of the points that were seen."""
     seen = tracked.fine.seen
     depth = float(np.median(seen.depth[tracked.fine.weights > 0]))
     centres = camera_pose.centre_from_pose(visual_map.T_kf_world)

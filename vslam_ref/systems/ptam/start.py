@@ -128,7 +128,10 @@ def _missing(parallax: float, wide: int, cost: float, depth: Array, s: StartSett
 
 
 def first_map(camera: Camera, trails: Trails, found: Attempt, settings: Settings) -> VisualMap:
-    """Make a map of two keyframes from a start; the median depth in the first is 1."""
+    """Make a map of two keyframes from a start; the median depth in the first is 1, in its own unit.
+
+    Implements A§2.2.2.
+    """
     first, last = trails.pictures[0], trails.pictures[-1]
     scale = 1.0 / float(np.median(found.X_a[found.good, 2]))
     T_b_a = se3.from_rt(se3.rotation(found.T_b_a), scale * se3.translation(found.T_b_a))

@@ -67,9 +67,9 @@ def adjust(
         Changed in place.
     robust : Robust
         Tukey's loss with an adaptive scale.
-    active : array_like of int, optional
+    active : array_like of int, shape (a,), optional
         Keyframes that move, for a local adjustment; all by default.
-    fixed : array_like of int
+    fixed : array_like of int, shape (f,)
         Keyframes that never move.
     options : Options, optional
 
@@ -93,7 +93,10 @@ def adjust(
 
 
 def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,)) -> _Whole:
-    """Return the living points and their sightings as a problem of bundle adjustment."""
+    """Return the living points and their sightings as a problem of bundle adjustment, in pixels.
+
+    Keyframes ``fixed (f,)`` do not move.
+    """
     seen = visual_map.sightings
     on = np.flatnonzero(seen["on"])
     points = np.flatnonzero(visual_map.alive)

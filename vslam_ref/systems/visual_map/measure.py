@@ -70,7 +70,7 @@ def look(
         n points, where they are expected.
     picture : Picture
     radius : array_like, shape () or (n,)
-        Pixels of level 0.
+        In pixels of level 0.
     looks : Looks
 
     Returns
@@ -102,7 +102,7 @@ def look(
 def locate(
     image: Bytes, corners: Corners, patches: Templates, uv: Array, radius: Array, looks: Looks = PLAIN
 ) -> Measured:
-    """Look for patches on one level, all in that level's pixels."""
+    """Look for patches around ``uv (n, 2)`` within ``radius (n,)``, all in pixels of one level."""
     patch = patches.patch
     place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
     spread = variation(patch)

@@ -25,7 +25,11 @@ MARGIN = 5.0
 
 
 class Sources(NamedTuple):
-    """Where points were first seen: kf (n,), level (n,), pixel uv (n, 2), slope (n, 2, 2) and depth (n,)."""
+    """Where points were first seen.
+
+    Keyframe ``kf (n,)``, ``level (n,)``, pixel ``uv (n, 2)``, d xn / d pixel ``slope (n, 2, 2)``, and
+    ``depth (n,)``.
+    """
 
     kf: IntArray
     level: IntArray

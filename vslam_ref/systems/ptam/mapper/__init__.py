@@ -7,5 +7,6 @@ module              holds
 ``new_points``      corners that nothing explains yet, found in a neighbour and back, with depth
 ``curve_search``    corners near the curve along which a point may appear
 ``associate``       known points, looked for where a known pose puts them
+``book``            the same in plain loops, as chapter 11 reads it
 ==================  ==============================================================================
 """

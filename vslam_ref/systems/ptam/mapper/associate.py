@@ -12,7 +12,10 @@ from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, look, visibl
 def look_again(
     visual_map: VisualMap, kf: int, picture: Picture, points: IntArray, radius: float, looks: Looks
 ) -> IntArray:
-    """Look in a keyframe for points (n,) that it does not see yet; add what is found, return the points."""
+    """Look in a keyframe for points (n,) that it does not see yet, within a radius in pixels.
+
+    What is found is added to the map; its points are returned.
+    """
     new = np.setdiff1d(points, visual_map.measured_in(kf))
     seen = visible(visual_map, visual_map.T_kf_world[kf], new)
     found = look(visual_map, seen, picture, radius, looks)
@@ -23,7 +26,10 @@ def look_again(
 def look_in_neighbours(
     visual_map: VisualMap, keyframes: IntArray, points: IntArray, radius: float, looks: Looks
 ) -> int:
-    """Look for new points in other keyframes; return how many sightings were added."""
+    """Look for new points (n,) in other keyframes (k,), within a radius in pixels.
+
+    Return how many sightings were added.
+    """
     total = 0
     for kf in keyframes:
         picture = picture_of(visual_map, int(kf))
@@ -32,7 +38,10 @@ def look_in_neighbours(
 
 
 def seldom_found(visual_map: VisualMap, tries: int, share: float) -> IntArray:
-    """Points that were looked for often and found too seldom."""
+    """Points that were looked for often and found in too small a share of the looks.
+
+    Implements :eq:`eq-seldom-found`.
+    """
     table = visual_map.points
     often = table["alive"] & (table["tried"] >= tries)
     return np.flatnonzero(often & (table["found"] < share * table["tried"]))

@@ -41,7 +41,7 @@ class Corner(NamedTuple):
 
 
 class OnCurve(NamedTuple):
-    """Best corner of each point (n,), -1 without one, and its cost over the patch's variation."""
+    """Best ``corner (n,)`` of each point, -1 if none; ``cost (n,)`` over the patch's variation, no unit."""
 
     corner: IntArray
     cost: Array
@@ -133,10 +133,15 @@ def _near_curve(
 
 
 def ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
-    """Distances (n, 2) along both rays of where they come closest; infinite, with a sign, if parallel."""
+    """Distances (n, 2) along rays ``a (n, 3)``, ``b (n, 3)`` of where they come closest.
+
+    In the unit of the translation of ``T_b_a (4, 4)``; without meaning if the rays are parallel.
+
+    Implements :eq:`eq-ray-depths`.
+    """
     ra = a @ se3.rotation(T_b_a).T
     t = se3.translation(T_b_a)
     c = np.einsum("ni,ni->n", ra, b)
     p, q = ra @ t, b @ t
     under = np.maximum(1.0 - c * c, 1e-12)
-    return np.stack([(c * q - p) / under, (q - c * p) / under], 1)
+    return np.stack([(c * q - p) / under, (q - c * p) / under], 1)  # eq-ray-depths

@@ -49,7 +49,10 @@ class Mapped(NamedTuple):
 def map_keyframe(
     visual_map: VisualMap, picture: Picture, T_cam_world: Array, seen: Measurements, settings: Settings
 ) -> Mapped:
-    """Take a picture into the map as a keyframe, and make the map better by it."""
+    """Take a picture with its pose ``T_cam_world (4, 4)`` into the map, and make the map better by it.
+
+    Lengths have the map's own unit.  Implements A§2.2.2.1.
+    """
     s, f = settings.mapper, settings.features
     looks = Looks(f.limit, f.measure, f.absolute, f.first_refine)
     kf = visual_map.add_keyframe(T_cam_world, picture)

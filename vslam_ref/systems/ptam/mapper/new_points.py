@@ -40,6 +40,7 @@ class Side(NamedTuple):
     peaks : Corner
         Those that stand out among their neighbours, with rays.
     T_cam_world : ndarray, shape (4, 4)
+        Lengths in the map's own unit.
     """
 
     kf: int
@@ -51,7 +52,7 @@ class Side(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Matches: row among the candidates (n,), pixels of level 0 in either picture (n, 2)."""
+    """Matches: ``row (n,)`` among the candidates, pixels of level 0 ``uv_a (n, 2)``, ``uv_b (n, 2)``."""
 
     row: IntArray
     uv_a: Array
@@ -63,10 +64,12 @@ def new_points(
 ) -> IntArray:
     """Add points that the newest keyframe is the first to explain; return their numbers (n,).
 
+    Implements A§2.2.2.1, the new points.
+
     Parameters
     ----------
     visual_map : VisualMap
-        Changed in place.
+        Changed in place; lengths have its own unit.
     kf : int
         The keyframe.
     picture : Picture
@@ -111,13 +114,13 @@ def partners(visual_map: VisualMap, kf: int, count: int) -> IntArray:
 
 
 def median_depth(visual_map: VisualMap, kf: int) -> float:
-    """Median depth of the points that a keyframe sees; 1 if it sees none."""
+    """Median depth of the points that a keyframe sees, in the map's own unit; 1 if it sees none."""
     X = visual_map.X_world[visual_map.measured_in(kf)]
     return float(np.median(se3.act(visual_map.T_kf_world[kf], X)[:, 2])) if len(X) else 1.0
 
 
 def free(visual_map: VisualMap, kf: int, xy: Pixels, level: int, spacing: float) -> BoolArray:
-    """Which corners (n, 2) of a level are farther than ``spacing`` from all that the keyframe sees, (n,)."""
+    """Which corners (n, 2) are ``spacing`` pixels of a level away from all that the keyframe sees, (n,)."""
     from scipy.spatial import cKDTree
 
     seen = visual_map.sightings
@@ -133,6 +136,8 @@ def match(
 ) -> Pairs:
     """Corners (n, 2) of a in b: on their curve, refined, and found back in a.
 
+    Implements :eq:`eq-search-back`.
+
     Parameters
     ----------
     camera : Camera
@@ -140,7 +145,7 @@ def match(
         Pixels of the level, with a whole patch.
     a, b : Side
     near : float
-        Least depth in a.
+        Least depth in a, in the map's own unit.
     s, f : MapperSettings, FeatureSettings
 
     Returns
