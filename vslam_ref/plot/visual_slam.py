@@ -62,8 +62,8 @@ def _side(panel: Axes, scene: Scene, side: tuple[str, int, int]) -> None:
     at = [a, b]
     panel.plot(*scene.points[:, at].T, ".", color=style.SKY, ms=1.6, alpha=0.6, label="point", zorder=1)
     if len(scene.truth):
-        panel.plot(*scene.truth[:, at].T, "--", color=style.BLACK, lw=1.4, label="truth", zorder=3)
-    panel.plot(*scene.path[:, at].T, color=style.VERMILION, lw=1.4, label="path", zorder=4)
+        panel.plot(*scene.truth[:, at].T, "--", color=style.BLACK, lw=0.9, label="truth", zorder=5)
+    panel.plot(*scene.path[:, at].T, color=style.VERMILION, lw=2.2, label="path", zorder=3)
     panel.plot(
         *scene.keyframes[:, at].T, "o", color=style.BLUE, ms=3.5, mfc="none", label="keyframe", zorder=5
     )
@@ -86,6 +86,7 @@ def _frame(panel: Axes, scene: Scene, at: list[int]) -> None:
     down = scene.y_down and at[1] == 1
     panel.set_ylim(*((y + half, y - half) if down else (y - half, y + half)))
     panel.set_aspect("equal")
+    panel.locator_params(nbins=5)
 
 
 class Course(NamedTuple):
@@ -150,9 +151,10 @@ def _points(panel: Axes, course: Course) -> None:
     panel.plot(course.number, course.trails, ":", color=style.GREEN, lw=1.4, label="corners before the start")
     panel.fill_between(course.number, course.tried, color=style.SKY, alpha=0.35, lw=0, label="tried")
     panel.plot(course.number, course.found, color=style.BLUE, lw=1.1, label="found")
-    panel.set_ylim(bottom=0)
+    most = np.nan_to_num([course.trails, course.tried]).max(initial=1.0)
+    panel.set_ylim(0, 1.3 * most)  # room for the names
     panel.set_ylabel("points")
-    panel.legend(loc="lower right", frameon=False, ncols=3)
+    panel.legend(loc="upper right", frameon=False, ncols=3)
 
 
 def _quality(panel: Axes, course: Course) -> None:
@@ -171,7 +173,7 @@ def _time(panel: Axes, course: Course) -> None:
     panel.plot(
         course.number[k], course.ms[k], "o", color=style.BLUE, ms=4, mfc="none", label="with a keyframe"
     )
-    if np.nanmax(course.ms, initial=0.0) > 0:
+    if np.nan_to_num(course.ms).max(initial=0.0) > 0:
         panel.set_yscale("log")
     panel.set_ylabel("time [ms]")
     panel.legend(loc="upper right", frameon=False, ncols=2)

@@ -31,7 +31,7 @@ from vslam_ref.datasets.bundle_files.ply import write_ply
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows, trajectory
 from vslam_ref.experiments.ptam.overlay import find_plane
-from vslam_ref.experiments.ptam.running import WAITING, Run, path
+from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, WAITING, Run, path
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot.saving import figure_bytes
 from vslam_ref.plot.visual_slam import Course, Scene, course_figure, map_figure
@@ -120,12 +120,13 @@ def course(run: Run) -> Course:
     tried, found, sigma, seconds = np.array(
         [(f.tried, f.found, f.sigma, f.seconds) for f in frames], float
     ).reshape(-1, 4).T  # fmt: skip
-    before = np.array([f.state == WAITING for f in frames], bool)
+    before = np.array([f.state == WAITING and f.tried > 0 for f in frames], bool)
+    after = np.array([f.state in (GOOD, POOR, LOST) for f in frames], bool)
     return Course(
         np.array([f.number for f in frames], np.int64),
         np.where(before, tried, np.nan),
-        np.where(before, np.nan, tried),
-        np.where(before, np.nan, found),
+        np.where(after, tried, np.nan),
+        np.where(after, found, np.nan),
         sigma,
         1e3 * seconds,
         np.array([f.keyframe for f in frames], bool),
