@@ -15,7 +15,7 @@ from sequence_samples import CALIB, COUNT, LAYOUTS, SIZE, START_NS, encoded, pla
 
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.sequences import PROBLEMS, Sequence, open_sequence, read_camera, write_plain_camera
-from vslam_ref.datasets.sequences.films import Film
+from vslam_ref.datasets.sequences.films import VideoFile
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Fov, Pinhole, Radtan
@@ -649,7 +649,7 @@ def test_stamps_of_a_real_video() -> None:
     folder = catalogue.find("opencv_box_object")
     if folder is None:
         pytest.skip("data set opencv_box_object not found in VSLAM_REF_DATA")
-    video = Film(folder / "box.mp4")
+    video = VideoFile(folder / "box.mp4")
     assert (len(video.times), video.size) == (455, (640, 480))
     assert "the file says 456 pictures; 455 can be decoded" in video.notes
     stamps = np.loadtxt(folder / "times.txt")

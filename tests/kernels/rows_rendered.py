@@ -21,7 +21,7 @@ def read_only(a: np.ndarray) -> np.ndarray:
     return a
 
 
-def before(rng: Rng, n: int) -> tuple[quads.Quads, textures.Textures, raster.Rays, list[np.ndarray]]:
+def before(rng: Rng, n: int) -> tuple[quads.Quads, textures.Textures, raster.RayTable, list[np.ndarray]]:
     """n boxes on a floor, two textures, the rays of a camera with a lens, and what is placed before it."""
     images = [picture(painted_wall(rng, 60, size), size=size) for size in ((64, 128), (128, 64))]
     boxes = [
@@ -41,7 +41,7 @@ def for_nearest(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return rays.xn, *at
 
 
-def some_rays(rng: Rng, rays: raster.Rays, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def some_rays(rng: Rng, rays: raster.RayTable, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rays within half a pixel of random pixels, (N, 2), and these pixels' columns and rows."""
     column, row = (rng.integers(0, most, 40 * n) for most in SIZE)
     shift = rng.uniform(-0.5, 0.5, (40 * n, 2))

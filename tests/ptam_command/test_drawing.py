@@ -110,7 +110,7 @@ def test_from_above_both_sides_of_the_roof_are_seen_and_no_wall() -> None:
 def test_the_grid_goes_through_the_lens(camera: Pinhole | Fov) -> None:
     """Seen pixels are those of the camera's own projection; ends behind the camera are not seen."""
     T = se3.from_rt(so3.exp([1.2, 0.1, 0.2]), [0.1, 0.8, 1.5])  # stands on the plane: a part is behind
-    view = solids.View(camera, (320, 240), T)
+    view = solids.SolidView(camera, (320, 240), T)
     ends = solids.grid(1.0)
     uv, seen = view.pixels(ends)
     X = se3.act(T, ends)

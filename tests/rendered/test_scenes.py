@@ -13,14 +13,14 @@ from vslam_ref.features import corners
 from vslam_ref.features.levels import pyramid
 from vslam_ref.geometry import se3
 from vslam_ref.support.errors import InputError
-from vslam_ref.worlds.rendered import NAMES, Effects, Scene, motion, painting, pinhole, raster, scene, wide
+from vslam_ref.worlds.rendered import NAMES, Effects, RenderedScene, motion, painting, pinhole, raster, scene, wide
 from vslam_ref.worlds.rendered.rotation import ARM
 
 SMALL = (160, 120)
 
 
 @pytest.fixture(scope="module")
-def made() -> dict[str, Scene]:
+def made() -> dict[str, RenderedScene]:
     """Every scene, with small pictures."""
     return {name: scene(name, size=SMALL) for name in NAMES}
 
@@ -28,7 +28,7 @@ def made() -> dict[str, Scene]:
 # --- bytes
 
 
-def test_the_same_seed_gives_the_same_bytes_in_any_order(made: dict[str, Scene]) -> None:
+def test_the_same_seed_gives_the_same_bytes_in_any_order(made: dict[str, RenderedScene]) -> None:
     effects = Effects(noise=3.0, exposure=0.3)
     once = scene("rotation", size=SMALL, frames=20, effects=effects)
     again = replace(made["rotation"], effects=effects)
@@ -53,7 +53,7 @@ def test_wrong_arguments_are_told() -> None:
             scene("rotation", frames=frames)
 
 
-def test_a_picture_that_is_not_there(made: dict[str, Scene]) -> None:
+def test_a_picture_that_is_not_there(made: dict[str, RenderedScene]) -> None:
     for k in (-1, 300):
         with pytest.raises(IndexError, match=f"picture {k} of rotation: has 0 to 299"):
             made["rotation"].frame(k)
@@ -63,7 +63,7 @@ def test_a_picture_that_is_not_there(made: dict[str, Scene]) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_path_is_that_of_a_person_and_meets_nothing(made: dict[str, Scene], name: str) -> None:
+def test_a_path_is_that_of_a_person_and_meets_nothing(made: dict[str, RenderedScene], name: str) -> None:
     """No step of more than 6 cm or 3 degrees at 30 Hz; nothing nearer than 15 cm, nothing missing."""
     s = made[name]
     T = s.T_cam_world
@@ -80,7 +80,7 @@ def test_a_path_is_that_of_a_person_and_meets_nothing(made: dict[str, Scene], na
         assert depth.min() > 0.15, k
 
 
-def test_what_the_paths_are_for(made: dict[str, Scene]) -> None:
+def test_what_the_paths_are_for(made: dict[str, RenderedScene]) -> None:
     place = {name: made[name].trajectory().t_world_body for name in NAMES}
     length = {name: np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for name, p in place.items()}
     heading = made["corridor"].trajectory().R_world_body[:, :, 2]
@@ -124,7 +124,7 @@ def test_a_tremor_has_the_size_that_was_asked_for() -> None:
 
 
 @pytest.mark.parametrize("lens", ["pinhole", "fov"])
-def test_tracks_agree_with_depths_and_surface(made: dict[str, Scene], lens: str) -> None:
+def test_tracks_agree_with_depths_and_surface(made: dict[str, RenderedScene], lens: str) -> None:
     """What a pixel sees is projected to it; a point is visible where its depth is that of the picture.
 
     A picture has the depths of pixels' centres, so points within 2 px of a border are left out.
@@ -155,7 +155,7 @@ def test_tracks_agree_with_depths_and_surface(made: dict[str, Scene], lens: str)
     assert checked > 80
 
 
-def test_a_point_behind_a_thing_is_hidden(made: dict[str, Scene]) -> None:
+def test_a_point_behind_a_thing_is_hidden(made: dict[str, RenderedScene]) -> None:
     s = made["desk"]
     s = replace(s, times=s.times[:2])
     X = s.surface(0, np.array([[80.0, 60.0], [40.0, 80.0]]))
@@ -168,7 +168,7 @@ def test_a_point_behind_a_thing_is_hidden(made: dict[str, Scene]) -> None:
 
 
 @pytest.mark.parametrize(("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole")])
-def test_corners_stay_where_their_points_are_projected(made: dict[str, Scene], name: str, lens: str) -> None:
+def test_corners_stay_where_their_points_are_projected(made: dict[str, RenderedScene], name: str, lens: str) -> None:
     """OpenCV follows corners of picture 30 into pictures up to 6 later, from their exact projections.
 
     Patches of 15 x 15 pixels on planes: over so few pictures their shape changes by some percent, so the
@@ -205,7 +205,7 @@ def test_corners_stay_where_their_points_are_projected(made: dict[str, Scene], n
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_there_are_corners_at_every_level(made: dict[str, Scene], name: str) -> None:
+def test_there_are_corners_at_every_level(made: dict[str, RenderedScene], name: str) -> None:
     """At 320 x 240 the four levels are 320 to 40 pixels wide: some in each, in each of several pictures."""
     s = replace(made[name], size=(320, 240), camera=pinhole(name, (320, 240)))
     for k in np.linspace(0, len(s) - 1, 4).astype(int):
@@ -216,7 +216,7 @@ def test_there_are_corners_at_every_level(made: dict[str, Scene], name: str) -> 
 # --- effects
 
 
-def test_effects_do_what_they_say(made: dict[str, Scene]) -> None:
+def test_effects_do_what_they_say(made: dict[str, RenderedScene]) -> None:
     """Noise: the standard deviation of 15,000 draws is known to 0.6 %, rounding adds 1/12; 5 deviations."""
     plain = made["desk"]
     sharp = plain.light(20)
@@ -232,7 +232,7 @@ def test_effects_do_what_they_say(made: dict[str, Scene]) -> None:
     assert bright.frame(52).max() == 255  # the sensor's limit
 
 
-def test_a_shutter_takes_the_mean_along_the_path(made: dict[str, Scene]) -> None:
+def test_a_shutter_takes_the_mean_along_the_path(made: dict[str, RenderedScene]) -> None:
     """Long open, it blurs: less contrast along the motion, the same mean."""
     plain = made["desk"]
     slow = replace(plain, effects=Effects(shutter=0.3, blur_samples=4))

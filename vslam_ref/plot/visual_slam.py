@@ -21,7 +21,7 @@ KEPT = (2.0, 98.0)
 MARGIN = 0.06
 
 
-class Scene(NamedTuple):
+class MapDrawing(NamedTuple):
     """What is drawn of a map.
 
     Attributes
@@ -46,7 +46,7 @@ class Scene(NamedTuple):
     y_down: bool
 
 
-def map_figure(scene: Scene, title: str) -> Figure:
+def map_figure(scene: MapDrawing, title: str) -> Figure:
     """Draw points, keyframes and paths from three sides, in one scale each."""
     with style.house_style():
         figure, panels = style.new_figure(4.4, 3)
@@ -57,7 +57,7 @@ def map_figure(scene: Scene, title: str) -> Figure:
     return figure
 
 
-def _side(panel: Axes, scene: Scene, side: tuple[str, int, int]) -> None:
+def _side(panel: Axes, scene: MapDrawing, side: tuple[str, int, int]) -> None:
     words, a, b = side
     at = [a, b]
     panel.plot(*scene.points[:, at].T, ".", color=style.SKY, ms=1.6, alpha=0.6, label="point", zorder=1)
@@ -73,7 +73,7 @@ def _side(panel: Axes, scene: Scene, side: tuple[str, int, int]) -> None:
     panel.set_ylabel(f"{AXES[b]} [{scene.unit}]")
 
 
-def _frame(panel: Axes, scene: Scene, at: list[int]) -> None:
+def _frame(panel: Axes, scene: MapDrawing, at: list[int]) -> None:
     """A square that holds the paths and most of the points."""
     parts = [scene.path, scene.keyframes, scene.truth]
     if len(scene.points):
@@ -89,7 +89,7 @@ def _frame(panel: Axes, scene: Scene, at: list[int]) -> None:
     panel.locator_params(nbins=5)
 
 
-class Course(NamedTuple):
+class CourseDrawing(NamedTuple):
     """Tracking, one entry a picture; NaN where there is nothing to tell.
 
     Attributes
@@ -129,7 +129,7 @@ STATES = {
 """State of a picture -> colour and words, from the lowest row to the highest."""
 
 
-def course_figure(course: Course, title: str) -> Figure:
+def course_figure(course: CourseDrawing, title: str) -> Figure:
     """Draw points, sigma, quality and time over the pictures."""
     with style.house_style():
         figure = Figure(figsize=(style.WIDTH, 7.6), dpi=style.DPI, layout="constrained")
@@ -147,7 +147,7 @@ def course_figure(course: Course, title: str) -> Figure:
     return figure
 
 
-def _points(panel: Axes, course: Course) -> None:
+def _points(panel: Axes, course: CourseDrawing) -> None:
     panel.plot(course.number, course.trails, ":", color=style.GREEN, lw=1.4, label="corners before the start")
     panel.fill_between(course.number, course.tried, color=style.SKY, alpha=0.35, lw=0, label="tried")
     panel.plot(course.number, course.found, color=style.BLUE, lw=1.1, label="found")
@@ -157,7 +157,7 @@ def _points(panel: Axes, course: Course) -> None:
     panel.legend(loc="upper right", frameon=False, ncols=3)
 
 
-def _quality(panel: Axes, course: Course) -> None:
+def _quality(panel: Axes, course: CourseDrawing) -> None:
     """A mark in the row of its state for every picture; states that never came have no row."""
     names = [name for name in STATES if (course.state == name).any()]
     for row, name in enumerate(names):
@@ -167,7 +167,7 @@ def _quality(panel: Axes, course: Course) -> None:
     panel.set_ylim(-0.6, len(names) - 0.4)
 
 
-def _time(panel: Axes, course: Course) -> None:
+def _time(panel: Axes, course: CourseDrawing) -> None:
     panel.plot(course.number, course.ms, color=style.GREY, lw=0.8, label="picture")
     k = course.keyframe
     panel.plot(

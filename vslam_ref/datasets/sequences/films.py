@@ -27,7 +27,7 @@ def is_film(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-class Film:
+class VideoFile:
     """An opened video.
 
     Attributes

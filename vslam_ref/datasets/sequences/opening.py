@@ -17,7 +17,7 @@ from vslam_ref.datasets.pictures import Picture, read_picture
 from vslam_ref.datasets.sequences import scenes
 from vslam_ref.datasets.sequences.cameras import KINDS, read_camera
 from vslam_ref.datasets.sequences.contents import Contents, read_folder
-from vslam_ref.datasets.sequences.films import Film, is_film
+from vslam_ref.datasets.sequences.films import VideoFile, is_film
 from vslam_ref.datasets.sequences.record import MissingPictureError, Sequence
 from vslam_ref.datasets.sequences.times import by_rate, odd, read_times
 from vslam_ref.datasets.text import FormatError
@@ -31,7 +31,7 @@ LOOKED_AT = 32
 """Pictures whose heads are read to find the size of all."""
 
 
-class Options(NamedTuple):
+class Wanted(NamedTuple):
     """What the user gave beside the source; None where it was left out."""
 
     camera: Camera | Path | None
@@ -88,7 +88,7 @@ def open_sequence(
     """
     given = camera if isinstance(camera, Camera) else None if camera is None else Path(camera)
     clock, poses = (None if path is None else Path(path) for path in (times, truth))
-    options = Options(given, clock, rate, poses, camera_needed)
+    options = Wanted(given, clock, rate, poses, camera_needed)
     if times is not None and rate is not None:
         raise InputError("both a file of times and a rate were given: give one of them")
     if rate is not None and not 0 < rate < 1e6:
@@ -120,7 +120,7 @@ def _place(source: str) -> Path | None:
     raise InputError(f"{what}; scenes: {', '.join(NAMES)}")
 
 
-def _folder(folder: Path, options: Options) -> Sequence:
+def _folder(folder: Path, options: Wanted) -> Sequence:
     found = read_folder(folder)
     size, bits = _look(folder, found.pictures)
 
@@ -135,14 +135,14 @@ def _folder(folder: Path, options: Options) -> Sequence:
     return _joined(taken, found, options, (DEEP,) if bits == 16 else ())
 
 
-def _film(path: Path, options: Options) -> Sequence:
-    film = Film(path)
+def _film(path: Path, options: Wanted) -> Sequence:
+    film = VideoFile(path)
     camera, camera_from = _camera(options, film.size, None, path)
     taken = Taken(str(path), film.size, len(film.times), film.picture, camera, camera_from)
     return _joined(taken, Contents("video", (), film.times), options, film.notes)
 
 
-def _rendered(source: str, options: Options) -> Sequence:
+def _rendered(source: str, options: Wanted) -> Sequence:
     if options.camera is not None:
         raise InputError(f"scene {source} has its own camera: leave --camera out")
     scene = scenes.open_scene(source)
@@ -163,7 +163,7 @@ class Taken(NamedTuple):
     camera_from: str
 
 
-def _joined(taken: Taken, found: Contents, options: Options, told: tuple[str, ...]) -> Sequence:
+def _joined(taken: Taken, found: Contents, options: Wanted, told: tuple[str, ...]) -> Sequence:
     """The sequence: pictures, their times, and the truth in the same clock."""
     times, odd_times = _clock(taken.total, found.times, options)
     truth, truth_from, unpaired = _truth(options, found, times)
@@ -206,7 +206,7 @@ def _look(folder: Path, pictures: tuple[Path, ...]) -> tuple[tuple[int, int], in
 
 
 def _camera(
-    options: Options, size: tuple[int, int], own: Path | None, source: Path
+    options: Wanted, size: tuple[int, int], own: Path | None, source: Path
 ) -> tuple[Camera | None, str]:
     """The camera that was given, else the source's own; and where it comes from."""
     if isinstance(options.camera, Camera):
@@ -220,7 +220,7 @@ def _camera(
     raise InputError(f"{what}: give --camera FILE; it may be {KINDS}")
 
 
-def _clock(count: int, own: Array | None, options: Options) -> tuple[Array, list[str]]:
+def _clock(count: int, own: Array | None, options: Wanted) -> tuple[Array, list[str]]:
     """Times of all pictures, seconds, and what is to be told about them."""
     if options.times is not None:
         times = read_times(options.times)
@@ -234,7 +234,7 @@ def _clock(count: int, own: Array | None, options: Options) -> tuple[Array, list
     return own, odd(own)
 
 
-def _truth(options: Options, found: Contents, times: Array) -> tuple[Trajectory | None, str, list[str]]:
+def _truth(options: Wanted, found: Contents, times: Array) -> tuple[Trajectory | None, str, list[str]]:
     """The true trajectory in the clock of the pictures, where it is from, and what is to be told."""
     truth, numbers, place = found.truth, found.truth_numbers, found.truth_from
     if options.truth is not None:

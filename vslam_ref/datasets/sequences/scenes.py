@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from vslam_ref.worlds.rendered import NAMES, Scene, scene
+from vslam_ref.worlds.rendered import NAMES, RenderedScene, scene
 
 SEED = 1
 """Where none is given."""
@@ -16,7 +16,7 @@ def is_scene(source: str) -> bool:
     return _SOURCE.fullmatch(source) is not None
 
 
-def open_scene(source: str) -> Scene:
+def open_scene(source: str) -> RenderedScene:
     """Return the scene of that name and seed.
 
     Raises

@@ -138,12 +138,12 @@ def picture(run: Run, frame: Frame, T_cam_world: Array | None, stage: Stage | No
     return image
 
 
-def view_of(camera: Camera, size: tuple[int, int], T_cam_world: Array, stage: Stage) -> solids.View:
+def view_of(camera: Camera, size: tuple[int, int], T_cam_world: Array, stage: Stage) -> solids.SolidView:
     """The stage as a camera at a pose (4, 4) sees it."""
-    return solids.View(camera, size, se3.compose(T_cam_world, se3.inverse(stage.T_plane_world)))
+    return solids.SolidView(camera, size, se3.compose(T_cam_world, se3.inverse(stage.T_plane_world)))
 
 
-def draw_stage(image: Bytes, view: solids.View, cell: float, unit: float) -> None:
+def draw_stage(image: Bytes, view: solids.SolidView, cell: float, unit: float) -> None:
     """Draw the grid, and the house on it, by the camera's projection."""
     uv, seen = view.pixels(solids.grid(cell))
     raster.lines(image, uv[seen.all(1)], GRID, 0.5 * unit, 0.6)

@@ -34,7 +34,7 @@ from vslam_ref.experiments.ptam.overlay import find_plane
 from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, WAITING, Run, path
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot.saving import figure_bytes
-from vslam_ref.plot.visual_slam import Course, Scene, course_figure, map_figure
+from vslam_ref.plot.visual_slam import CourseDrawing, MapDrawing, course_figure, map_figure
 from vslam_ref.support import pages
 from vslam_ref.support.files import write_text
 from vslam_ref.support.json_text import to_json
@@ -92,20 +92,20 @@ def write_map(target: Path, visual_map: VisualMap) -> None:
     write_ply(target, BundleFile(whole.problem, colours=colours, image_sizes=sizes))
 
 
-def scene(run: Run, visual_map: VisualMap, final: Accuracy) -> Scene:
+def scene(run: Run, visual_map: VisualMap, final: Accuracy) -> MapDrawing:
     """The map as it is drawn: in the frame of the truth where there is one."""
     numbers, T = path(run)
     gaps = np.flatnonzero(np.diff(numbers) > _step(run)) + 1
     way = np.insert(camera_pose.centre_from_pose(T), gaps, np.nan, axis=0)
     points, kf = visual_map.X_world[visual_map.alive], camera_pose.centre_from_pose(visual_map.T_kf_world)
     if final.alignment is None:
-        return Scene(points, kf, way, np.zeros((0, 3)), "median depth of the first picture", True)
+        return MapDrawing(points, kf, way, np.zeros((0, 3)), "median depth of the first picture", True)
 
     def moved(X: Array) -> Array:
         assert final.alignment is not None
         return np.where(np.isfinite(X), final.alignment.act(np.nan_to_num(X)), np.nan)
 
-    return Scene(moved(points), moved(kf), moved(way), final.truth, "unit of the truth", False)
+    return MapDrawing(moved(points), moved(kf), moved(way), final.truth, "unit of the truth", False)
 
 
 def _step(run: Run) -> int:
@@ -114,7 +114,7 @@ def _step(run: Run) -> int:
     return int(numbers[1] - numbers[0]) if len(numbers) > 1 else 1
 
 
-def course(run: Run) -> Course:
+def course(run: Run) -> CourseDrawing:
     """Tracking over the pictures, as it is drawn."""
     frames = run.frames
     tried, found, sigma, seconds = np.array(
@@ -122,7 +122,7 @@ def course(run: Run) -> Course:
     ).reshape(-1, 4).T  # fmt: skip
     before = np.array([f.state == WAITING and f.tried > 0 for f in frames], bool)
     after = np.array([f.state in (GOOD, POOR, LOST) for f in frames], bool)
-    return Course(
+    return CourseDrawing(
         np.array([f.number for f in frames], np.int64),
         np.where(before, tried, np.nan),
         np.where(after, tried, np.nan),

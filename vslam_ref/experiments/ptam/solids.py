@@ -69,7 +69,7 @@ def faces_towards(faces: tuple[Face, ...], eye: Array) -> list[Face]:
     return [face for face in faces if face.normal @ (eye - face.corners[0]) > 0]
 
 
-class View(NamedTuple):
+class SolidView(NamedTuple):
     """A camera (its picture's size is (width, height)) at a pose ``T_cam_plane`` (4, 4)."""
 
     camera: Camera

@@ -4,10 +4,10 @@
 
     scenes      desk, corridor, rotation, building: things and a path, from a seed
       quads       rectangles and boxes               motion      smooth paths, a hand's tremor
-      painting    grey values of their surfaces      scene       pictures, depth, tracks, effects
+      painting    grey values of their surfaces      record      pictures, depth, tracks, effects
     raster      from quads to pixels                 textures    mip levels, footprints
 
-    Scene.frame(k):   T_cam_world -> placed (a homography for each quad, a box in the image)
+    RenderedScene.frame(k):   T_cam_world -> placed (a homography for each quad, a box in the image)
                                   -> nearest (H, W) -> shade (H, W) -> borders again, finer
                                   -> mean over the shutter, exposure, noise -> uint8 (H, W)
 
@@ -18,7 +18,7 @@ camera's frame is x right, y down, z ahead.  With NumPy a picture of 640 x 480 t
 second, with Numba about a seventh of it.
 """
 
-from vslam_ref.worlds.rendered.scene import Effects, Scene, Tracks
+from vslam_ref.worlds.rendered.record import Effects, RenderedScene, PointTracks
 from vslam_ref.worlds.rendered.scenes import NAMES, pinhole, scene, wide
 
-__all__ = ["NAMES", "Effects", "Scene", "Tracks", "pinhole", "scene", "wide"]
+__all__ = ["NAMES", "Effects", "RenderedScene", "PointTracks", "pinhole", "scene", "wide"]

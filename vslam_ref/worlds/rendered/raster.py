@@ -37,7 +37,7 @@ BACKGROUND = 96.0
 """Grey value where there is nothing."""
 
 
-class Rays(NamedTuple):
+class RayTable(NamedTuple):
     """The rays of all pixels of an image, on the plane z = 1 of the camera.
 
     Attributes
@@ -55,7 +55,7 @@ class Rays(NamedTuple):
     span: tuple[Array, Array, Array, Array]
 
 
-def ray_table(camera: Camera, size: tuple[int, int]) -> Rays:
+def ray_table(camera: Camera, size: tuple[int, int]) -> RayTable:
     """Invert the lens at every pixel of an image of ``size`` (W, H), once for all images.
 
     Raises
@@ -74,10 +74,10 @@ def ray_table(camera: Camera, size: tuple[int, int]) -> Rays:
     # half a pixel more, for the finer rays at borders
     more_x, more_y = np.abs(spread[..., 0, :]).sum(-1) / 2, np.abs(spread[..., 1, :]).sum(-1) / 2
     span = (x - more_x).min(0), (x + more_x).max(0), (y - more_y).min(1), (y + more_y).max(1)
-    return Rays(xn, spread, span)
+    return RayTable(xn, spread, span)
 
 
-class Placed(NamedTuple):
+class PlacedQuads(NamedTuple):
     """Quads before one camera.
 
     Attributes
@@ -95,8 +95,8 @@ class Placed(NamedTuple):
     box: IntArray
 
 
-def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> Placed:
-    """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is that of its :class:`Rays`."""
+def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> PlacedQuads:
+    """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is that of its :class:`RayTable`."""
     extent = np.ascontiguousarray(textures.extent[quads.texture])
     R = se3.rotation(T_cam_world)
     corner = se3.act(T_cam_world, quads.corner)
@@ -105,7 +105,7 @@ def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Arr
     flat = np.abs(np.linalg.det(M)) < 1e-15  # seen exactly from the edge: nothing
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), M))
     outline = corner[:, None] + np.stack([0 * side[:, 0], side[:, 0], side.sum(1), side[:, 1]], 1)
-    return Placed(inverse, extent, np.where(flat[:, None], 0, _boxes(outline, span)))
+    return PlacedQuads(inverse, extent, np.where(flat[:, None], 0, _boxes(outline, span)))
 
 
 def _boxes(outline: Array, span: tuple[Array, ...]) -> IntArray:
@@ -138,7 +138,7 @@ def nearest(xn: Array, homography: Array, extent: Array, box: IntArray) -> tuple
     xn : ndarray, shape (H, W, 2)
         Rays, normalised.
     homography, extent, box : ndarray, shapes (Q, 3, 3), (Q, 2), (Q, 4)
-        Of :class:`Placed`.
+        Of :class:`PlacedQuads`.
     """
     quad = np.full(xn.shape[:2], -1, np.int32)
     inverse_depth = np.zeros(xn.shape[:2])
@@ -167,7 +167,7 @@ def nearest_of(
     column, row : ndarray of int, shape (N,)
         Pixels that they belong to.
     homography, extent, box : ndarray, shapes (Q, 3, 3), (Q, 2), (Q, 4)
-        Of :class:`Placed`.
+        Of :class:`PlacedQuads`.
     """
     quad = np.full(len(xn), -1, np.int32)
     inverse_depth = np.zeros(len(xn))
@@ -231,7 +231,7 @@ def shade(
     return grey
 
 
-def render(quads: Quads, textures: Textures, rays: Rays, T_cam_world: Array) -> Array:
+def render(quads: Quads, textures: Textures, rays: RayTable, T_cam_world: Array) -> Array:
     """Grey values (H, W), 0 to 255 and not rounded, that a camera at ``T_cam_world`` (4, 4), metres, sees."""
     at = placed(quads, textures, T_cam_world, rays.span)
     height, width = rays.xn.shape[:2]

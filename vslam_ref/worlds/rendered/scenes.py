@@ -12,7 +12,7 @@ from vslam_ref.support.errors import InputError, suggestion
 from vslam_ref.worlds.rendered import building, corridor, desk, rotation
 from vslam_ref.worlds.rendered.motion import Path
 from vslam_ref.worlds.rendered.quads import Quads
-from vslam_ref.worlds.rendered.scene import EXACT, Effects, Scene
+from vslam_ref.worlds.rendered.record import EXACT, Effects, RenderedScene
 from vslam_ref.worlds.rendered.textures import Bytes, pack
 
 SIZE = (640, 480)
@@ -58,7 +58,7 @@ def scene(
     size: tuple[int, int] = SIZE,
     frames: int | None = None,
     effects: Effects = EXACT,
-) -> Scene:
+) -> RenderedScene:
     """Make a scene.
 
     Parameters
@@ -103,4 +103,4 @@ def scene(
     quads, images = recipe.build(things)
     lens = pinhole(name, size) if camera is None else camera
     times = np.arange(count) / RATE
-    return Scene(name, quads, pack(images), lens, size, recipe.path(way), times, effects, seed)
+    return RenderedScene(name, quads, pack(images), lens, size, recipe.path(way), times, effects, seed)

@@ -43,7 +43,7 @@ class Effects(NamedTuple):
 EXACT = Effects()
 
 
-class Tracks(NamedTuple):
+class PointTracks(NamedTuple):
     """Where points appear.
 
     Attributes
@@ -59,7 +59,7 @@ class Tracks(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Scene:
+class RenderedScene:
     """A world that never moves, and pictures of it by a moving camera.
 
     Attributes
@@ -97,7 +97,7 @@ class Scene:
         return len(self.times)
 
     @cached_property
-    def rays(self) -> raster.Rays:
+    def rays(self) -> raster.RayTable:
         """The rays of all pixels."""
         return raster.ray_table(self.camera, self.size)
 
@@ -149,7 +149,7 @@ class Scene:
         X_world = se3.act(se3.inverse(self.T_cam_world[k]), X_cam)
         return np.where(there[:, None], X_world, np.inf)
 
-    def tracks(self, X_world: ArrayLike) -> Tracks:
+    def tracks(self, X_world: ArrayLike) -> PointTracks:
         """Where world points (N, 3), metres, on surfaces of the scene appear in all pictures, and whether.
 
         A point counts as hidden if something is before it by more than a millionth of its depth.
@@ -163,7 +163,7 @@ class Scene:
             X_cam = se3.act(T, points[some])
             first = self._first(T, X_cam[:, :2] / X_cam[:, 2:])
             visible[k, some] = first * X_cam[:, 2] <= 1.0 + 1e-6
-        return Tracks(seen.uv, visible)
+        return PointTracks(seen.uv, visible)
 
     def _first(self, T_cam_world: Array, xn: Array) -> Array:
         """Inverse depths (N,) at which rays xn (N, 2) meet something."""
