@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from tests.tracking.conftest import Desk
 from vslam_ref.estimation.pose_tracking import track_pose
 from vslam_ref.features import level_sigma
 from vslam_ref.geometry import se3
@@ -21,7 +22,7 @@ V = np.array([0.004, -0.003, 0.005, 0.002, -0.003, 0.004])
 
 
 @pytest.fixture(scope="module")
-def points(desk: Desk) -> list[book.Point]:
+def points(desk: Any) -> list[book.Point]:
     """The map's rows as the book has them."""
     m, table = desk.map, desk.map.points
     pyramids = [tuple(m.image(level)[kf] for level in range(4)) for kf in range(2)]
@@ -34,7 +35,7 @@ def points(desk: Desk) -> list[book.Point]:
 
 
 @pytest.mark.parametrize("k", [0, 9])
-def test_visible_points_warps_and_levels(desk: Desk, points: list[book.Point], k: int) -> None:
+def test_visible_points_warps_and_levels(desk: Any, points: list[book.Point], k: int) -> None:
     """Products of three matrices with entries below 200: 1e-10 is some hundred roundings."""
     fast = visible(desk.map, desk.pose(k))
     slow = book.visible(desk.map.camera, points, desk.pose(k), desk.pictures[k])
@@ -47,7 +48,7 @@ def test_visible_points_warps_and_levels(desk: Desk, points: list[book.Point], k
 
 
 def test_a_camera_far_closer_looks_on_coarser_levels_and_one_far_away_on_none(
-    desk: Desk, points: list[book.Point]
+    desk: Any, points: list[book.Point]
 ) -> None:
     """Both forms where levels differ from those of the sources."""
     levels = set()
@@ -60,7 +61,7 @@ def test_a_camera_far_closer_looks_on_coarser_levels_and_one_far_away_on_none(
     assert len(levels) > 1
 
 
-def test_templates(desk: Desk, points: list[book.Point]) -> None:
+def test_templates(desk: Any, points: list[book.Point]) -> None:
     """Equal bytes, but where a grey level falls on a half within rounding: none here."""
     fast = visible(desk.map, desk.pose(9))
     patches = templates(desk.map, sources(desk.map, fast.point), fast.A, fast.level)
@@ -70,7 +71,7 @@ def test_templates(desk: Desk, points: list[book.Point]) -> None:
         np.testing.assert_array_equal(book.template(slow[row]), patches.patch[row])
 
 
-def test_found_places(desk: Desk, points: list[book.Point]) -> None:
+def test_found_places(desk: Any, points: list[book.Point]) -> None:
     """Every eighth point, expected where a guess that is a pixel or two off puts it."""
     T = se3.exp(V) @ desk.pose(9)
     fast = visible(desk.map, T)
@@ -85,7 +86,7 @@ def test_found_places(desk: Desk, points: list[book.Point]) -> None:
         assert not ok or np.abs(u - expected).max() < 1e-8  # up to ten steps of a contraction, on level 3
 
 
-def test_pose_from_the_same_matches(desk: Desk) -> None:
+def test_pose_from_the_same_matches(desk: Any) -> None:
     """Ten steps each; wrong matches among them."""
     rng = np.random.default_rng(1)
     fast = visible(desk.map, desk.pose(9))
@@ -104,7 +105,7 @@ def test_pose_from_the_same_matches(desk: Desk) -> None:
 
 
 @pytest.mark.slow
-def test_a_whole_picture(desk: Desk, points: list[book.Point]) -> None:
+def test_a_whole_picture(desk: Any, points: list[book.Point]) -> None:
     """Both passes with the same random choice: the same pose, and the same judgement."""
     settings = TrackerSettings()
     T_last, v = desk.pose(8), se3.log(desk.pose(8) @ se3.inverse(desk.pose(7)))

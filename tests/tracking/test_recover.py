@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from tests.tracking.conftest import Desk
 from vslam_ref.arrays import Array
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Fov, Pinhole
@@ -57,7 +58,7 @@ def test_the_generator_decides() -> None:
     np.testing.assert_array_equal(a.T_cam_world, b.T_cam_world)
 
 
-def test_patches_are_followed_to_where_their_points_are(desk: Desk) -> None:
+def test_patches_are_followed_to_where_their_points_are(desk: Any) -> None:
     known = recover.known_in(desk.map, 0)
     went = recover.follow_known(desk.pictures[0], desk.pictures[9], known, 15.0)
     assert len(went.point) > 0.5 * len(known.point)
@@ -67,7 +68,7 @@ def test_patches_are_followed_to_where_their_points_are(desk: Desk) -> None:
     assert np.mean(error < 1.5) > 0.9
 
 
-def test_the_picture_itself_is_most_alike(desk: Desk) -> None:
+def test_the_picture_itself_is_most_alike(desk: Any) -> None:
     for kf in range(2):
         again = recover.picture_of(desk.map, kf)
         assert recover.most_alike(desk.map, again, 2)[0] == kf

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from tests.tracking.conftest import FEATURES, Desk
 from vslam_ref.arrays import Array
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
@@ -20,7 +21,7 @@ NEAR = 5e-4
 is 0.02 px, 1.6e-4 radians, at 0.6 metres 1e-4 metres; times three, since some motions look alike."""
 
 
-def tracker(desk: Desk, k: int, velocity: Array | None = None) -> Tracker:
+def tracker(desk: Any, k: int, velocity: Array | None = None) -> Tracker:
     """A tracker that was right in picture k."""
     v = np.zeros(6) if velocity is None else velocity
     made = Tracker(Settings(), np.random.default_rng(0), DecayingVelocity(v, 1.0, 1.0), desk.pose(k))
@@ -32,7 +33,7 @@ def off(T: Array, truth: Array) -> float:
     return float(np.abs(se3.log(se3.compose(T, se3.inverse(truth)))).max())
 
 
-def test_from_the_velocity(desk: Desk) -> None:
+def test_from_the_velocity(desk: Any) -> None:
     """Picture 9 from picture 8, and the velocity that is remembered is the newest."""
     v = se3.log(desk.pose(8) @ se3.inverse(desk.pose(7)))
     one = tracker(desk, 8, v)
@@ -44,7 +45,7 @@ def test_from_the_velocity(desk: Desk) -> None:
     np.testing.assert_array_equal(one.T_last, found.T_cam_world)
 
 
-def test_a_velocity_is_a_better_guess_than_none(desk: Desk) -> None:
+def test_a_velocity_is_a_better_guess_than_none(desk: Any) -> None:
     """Over the scene's own motion: where constant velocity puts the pose, against where it was."""
     T = desk.scene.T_cam_world
     still = [off(T[k], T[k - 1]) for k in range(2, 10)]
@@ -55,7 +56,7 @@ def test_a_velocity_is_a_better_guess_than_none(desk: Desk) -> None:
     assert np.median(going) < 0.5 * np.median(still)
 
 
-def test_the_coarse_points_are_of_the_coarse_levels(desk: Desk) -> None:
+def test_the_coarse_points_are_of_the_coarse_levels(desk: Any) -> None:
     seen = visible(desk.map, desk.pose(9))
     large = np.count_nonzero(seen.level >= 2)
     settings = TrackerSettings(coarse_points=large + 5)
@@ -66,10 +67,10 @@ def test_the_coarse_points_are_of_the_coarse_levels(desk: Desk) -> None:
     assert np.count_nonzero(first.seen.level == 1) == 5
 
 
-def test_a_blank_picture_is_lost_and_the_next_is_found_again(desk: Desk) -> None:
+def test_a_blank_picture_is_lost_and_the_next_is_found_again(desk: Any) -> None:
     """Nothing is remembered of a lost picture but that it was lost; the way back is without a velocity."""
     one = tracker(desk, 6, np.full(6, 1e-3))
-    blank = prepare(7, np.full((120, 160), 90, np.uint8), FEATURES)
+    blank = prepare(7, np.full((120, 160), 90, np.uint8), Settings().features)
     gone = one.track(desk.map, blank)
     assert gone.quality is Quality.LOST
     assert one.lost == 1
@@ -80,7 +81,7 @@ def test_a_blank_picture_is_lost_and_the_next_is_found_again(desk: Desk) -> None
     assert (one.lost, one.motion.velocity.tolist()) == (0, [0.0] * 6)
 
 
-def test_a_guess_that_is_far_off_is_not_the_end(desk: Desk) -> None:
+def test_a_guess_that_is_far_off_is_not_the_end(desk: Any) -> None:
     """0.5 radians off: no point is where it is looked for, so patches are followed."""
     one = tracker(desk, 6, np.array([0, 0, 0, 0, 0.5, 0]))
     found = one.track(desk.map, desk.pictures[9])
@@ -89,6 +90,6 @@ def test_a_guess_that_is_far_off_is_not_the_end(desk: Desk) -> None:
     assert off(found.T_cam_world, desk.pose(9)) < NEAR
 
 
-def test_the_same_seed_gives_the_same_bytes(desk: Desk) -> None:
+def test_the_same_seed_gives_the_same_bytes(desk: Any) -> None:
     a, b = (tracker(desk, 6).track(desk.map, desk.pictures[9]) for _ in range(2))
     assert a.T_cam_world.tobytes() == b.T_cam_world.tobytes()

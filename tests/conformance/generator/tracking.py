@@ -10,10 +10,9 @@ from mpmath import mpf
 
 from generator.building import Topic, tolerance
 from generator.exact import column, derivative, floats, matrix, vector
-from generator.groups import SE3, log_rigid, motion, turned, twist
+from generator.groups import SE3, log_rigid, motion, twist
 from generator.se3 import case
 from generator.views import in_camera, looking, pixel, sensor
-from vslam_ref.geometry import so3
 
 TOPIC, CHAPTER = "tracking", 10
 
@@ -134,9 +133,10 @@ def _solved(
 def _goes_on(rng: np.random.Generator, decay: float) -> dict[str, Any]:
     """Two poses some degrees and decimetres apart."""
     before = motion(rng)
-    now = np.array(floats(SE3.exp(vector(0.1 * twist(rng))) * matrix(before)))
+    step = 0.1 * twist(rng)
+    now = np.array(floats(SE3.exp(vector(step)) * matrix(before)))
     moved = matrix(now) * matrix(before) ** -1
-    xi = log_rigid(moved, so3.log(np.array(floats(turned(moved)[0]))))
+    xi = log_rigid(moved, step[3:])
     there = {
         name: SE3.exp([factor * v for v in xi])
         for name, factor in (("right", mpf(decay)), ("decay-forgotten", mpf(1)), ("backwards", -mpf(decay)))
