@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -57,9 +58,7 @@ def test_the_same_matches(search_back: bool, wall: Any, settings: Settings) -> N
         sides.append(new_points.Side(0, level, picture.levels[level], picture.corners[level], found, T))
     xy = sides[0].peaks.xy
     xy = xy[cut(sides[0].image, xy).inside][::4]
-    one_way = new_points.match(
-        wall.camera, xy, *sides, 0.3, SimpleNamespace(**{**vars(s), "search_back": search_back}), f
-    )
+    one_way = new_points.match(wall.camera, xy, *sides, 0.3, replace(s, search_back=search_back), f)
     a, b = (book.Side(level, side.image, [(int(x), int(y)) for x, y in side.peaks.xy]) for side in sides)
     T_b_a, gates = wall.T_cam_world[1], book.Gates(s.epipolar, 0.3, f.limit, s.back)
     rows = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -107,10 +107,10 @@ def test_a_look_alike_on_the_line_is_refused_by_the_way_back(search_back: bool, 
     in_a, in_b = {(60, 50): 205, (110, 50): 220}, {(115, 50): 220}
     a = side(picture(in_a), list(in_a), camera, se3.identity())
     b = side(picture(in_b), list(in_b), camera, T_b_a)
-    s = SimpleNamespace(**{**vars(settings.mapper), "search_back": search_back})
+    s = replace(settings.mapper, search_back=search_back)
     xy = np.array([[60, 50]])
     assert cut(a.image, xy).inside.all()
-    found = new_points.match(camera, xy, a, b, 0.1, s, settings.features)  # type: ignore[arg-type]
+    found = new_points.match(camera, xy, a, b, 0.1, s, settings.features)
     assert len(found.row) == (0 if search_back else 1)
     if not search_back:
         assert np.hypot(*(found.uv_b[0] - [115, 50])) < 0.3
