@@ -26,11 +26,16 @@ STILL_TWICE = {
 
 NAMED_TWICE = {
     "Arrow": "the blocks of calibration's normal equations, in the book and in the fast module",
+    "Gates": "of the curve search, in the book of mapping and in the fast module",
     "Belief": "mean and covariance of a filter, in the books of the EKF and of the improved EKF",
     "Options": "thresholds of a solver, written with the solver's module: least squares, bundle adjustment",
+    "Match": "of a scan with a map; of a patch with a picture, in the book of tracking",
+    "Point": "of a path in an experiment; of a map, in the books of tracking and of mapping",
     "Run": "what one run of an experiment gave; no module sees two of them",
+    "Side": "one keyframe of two, in the book of mapping and in the fast module",
     "State": "a filter's means and blocks; how a patch's refinement ended",
     "Step": "of a descent, in the book of features and in least squares",
+    "Tracker": "of a camera, in PTAM; of moving things, in the grids",
 }
 """Class names that stand in two modules or more -> why they may.  Another one needs a better name."""
 

@@ -12,7 +12,7 @@ from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.systems.ptam.look import prepare
 from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.visual_map import Picture
+from vslam_ref.systems.visual_map import PreparedPicture
 from vslam_ref.worlds.pictures import painted_wall, picture
 
 CAMERA = Pinhole(200.0, 200.0, 99.5, 74.5)
@@ -25,7 +25,7 @@ class TwoViews(NamedTuple):
     """Pictures of the wall, the poses of their cameras (2, 4, 4), and the homography of the pixels."""
 
     camera: Pinhole
-    pictures: tuple[Picture, Picture]
+    pictures: tuple[PreparedPicture, PreparedPicture]
     T_cam_world: Array
     H_b_a: Array
 

@@ -24,7 +24,7 @@ from vslam_ref.systems.ptam.mapper.associate import seldom_found
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.visual_map import VisualMap, local_active, neighbours
-from vslam_ref.systems.visual_map.adjust import as_problem
+from vslam_ref.systems.visual_map.adjusting import as_problem
 
 CAMERAS = [Pinhole(200.0, 190.0, 99.5, 74.5), Fov(200.0, 190.0, 99.5, 74.5, 0.9)]
 T_B_A = se3.exp([-0.3, 0.05, 0.1, 0.05, -0.1, 0.08])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera
-from vslam_ref.systems.ptam import Outcome, Ptam
+from vslam_ref.systems.ptam import PictureOutcome, Ptam
 from vslam_ref.worlds.rendered import scene
 
 Bytes = NDArray[np.uint8]
@@ -29,7 +29,7 @@ class Run(NamedTuple):
     """The system after a film, and what it said of each picture."""
 
     system: Ptam
-    outcomes: list[Outcome]
+    outcomes: list[PictureOutcome]
 
 
 def run(film: Film, pictures: list[Bytes] | None = None) -> Run:

@@ -13,7 +13,17 @@ from vslam_ref.features import corners
 from vslam_ref.features.levels import pyramid
 from vslam_ref.geometry import se3
 from vslam_ref.support.errors import InputError
-from vslam_ref.worlds.rendered import NAMES, Effects, RenderedScene, motion, painting, pinhole, raster, scene, wide
+from vslam_ref.worlds.rendered import (
+    NAMES,
+    Effects,
+    RenderedScene,
+    motion,
+    painting,
+    pinhole,
+    raster,
+    scene,
+    wide,
+)
 from vslam_ref.worlds.rendered.rotation import ARM
 
 SMALL = (160, 120)
@@ -168,7 +178,9 @@ def test_a_point_behind_a_thing_is_hidden(made: dict[str, RenderedScene]) -> Non
 
 
 @pytest.mark.parametrize(("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole")])
-def test_corners_stay_where_their_points_are_projected(made: dict[str, RenderedScene], name: str, lens: str) -> None:
+def test_corners_stay_where_their_points_are_projected(
+    made: dict[str, RenderedScene], name: str, lens: str
+) -> None:
     """OpenCV follows corners of picture 30 into pictures up to 6 later, from their exact projections.
 
     Patches of 15 x 15 pixels on planes: over so few pictures their shape changes by some percent, so the

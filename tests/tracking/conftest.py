@@ -11,7 +11,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.features import finest_from_level
 from vslam_ref.systems.ptam.look import prepare, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings
-from vslam_ref.systems.visual_map import Picture, VisualMap
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 from vslam_ref.worlds.rendered import Scene, scene
 
 SIZE = (160, 120)
@@ -23,7 +23,7 @@ class Desk(NamedTuple):
 
     scene: Scene
     map: VisualMap
-    pictures: dict[int, Picture]
+    pictures: dict[int, PreparedPicture]
 
     def pose(self, k: int) -> Array:
         return np.asarray(self.scene.T_cam_world[k])

@@ -11,18 +11,18 @@ from vslam_ref.arrays import Array
 from vslam_ref.features import Corners, detect, pyramid, small_image
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
-from vslam_ref.systems.visual_map import Picture, VisualMap
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 
 CAMERA = Pinhole(150.0, 140.0, 63.5, 47.5)
 SIZE = (128, 96)
 
 
-def noise_picture(number: int) -> Picture:
+def noise_picture(number: int) -> PreparedPicture:
     """Grey noise, the same for the same number; no corners."""
     image = np.random.default_rng(number).integers(0, 256, SIZE[::-1], dtype=np.uint8)
     levels = pyramid(image, 2)
     none: tuple[Corners, ...] = tuple(detect(level, 254) for level in levels)
-    return Picture(number, levels, none, small_image(levels[1], 1))
+    return PreparedPicture(number, levels, none, small_image(levels[1], 1))
 
 
 def poses(count: int) -> Array:

@@ -8,7 +8,7 @@ import hypothesis.strategies as st
 import numpy as np
 from hypothesis import given
 
-from vslam_ref.systems.visual_map import Picture, VisualMap, neighbours, shared_points
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap, neighbours, shared_points
 from vslam_ref.systems.visual_map.rows import FIRST, Rows
 
 MakeMap = Callable[..., VisualMap]
@@ -118,7 +118,7 @@ def test_a_snapshot_does_not_see_what_happens_later(make_map: MakeMap) -> None:
         "on": then.sightings["on"].copy(),
         "image": then.image(1).copy(),
     }
-    picture = Picture(
+    picture = PreparedPicture(
         9, tuple(image[-1] for image in (then.image(0), then.image(1))), then.corners[0], then.small[0]
     )
     for _ in range(FIRST):  # beyond the room of the first keyframes

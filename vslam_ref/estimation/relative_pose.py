@@ -4,7 +4,8 @@ It minimises over the five numbers of a relative pose
 
 .. math:: \sum_j \rho\bigl( s_j(R, t) / \sigma \bigr) ,
 
-with the left perturbation of :mod:`vslam_ref.geometry.multiview.two_views.sampson`, by Levenberg-Marquardt.
+by Levenberg-Marquardt, with the left perturbation of
+:mod:`vslam_ref.geometry.multiview.two_views.sampson_distance`.
 All pairs count, far ones too: those fix the rotation.  No point is triangulated, so none has to have
 parallax.
 

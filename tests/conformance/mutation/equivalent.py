@@ -37,7 +37,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "/ to *",
     ): "the equations are homogeneous: their common factor cancels",
     (
-        "geometry.multiview.two_views.cheirality.cheirality",
+        "geometry.multiview.two_views.in_front.cheirality",
         "parallax = np.arctan2(np.linalg.norm(across, axis=-1), np.sum(a * b, axis=-1))",
         "* to /",
     ): "an angle told beside the cost: no vector asks for it",

@@ -39,7 +39,7 @@ from vslam_ref.support import pages
 from vslam_ref.support.files import write_text
 from vslam_ref.support.json_text import to_json
 from vslam_ref.systems.visual_map import VisualMap
-from vslam_ref.systems.visual_map.adjust import as_problem
+from vslam_ref.systems.visual_map.adjusting import as_problem
 
 FILM = "overlay.webm"
 FILES = ("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", FILM, "result.json")

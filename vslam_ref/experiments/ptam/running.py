@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
-from vslam_ref.systems.ptam.ptam import Outcome, Ptam
+from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
@@ -188,7 +188,7 @@ def _one(done: Run, image: Image) -> Frame:
     return _waited(done, frame, outcome, 0 if before is None else len(before.pictures))
 
 
-def _tracked(frame: Frame, outcome: Outcome, tracked: Tracked) -> Frame:
+def _tracked(frame: Frame, outcome: PictureOutcome, tracked: Tracked) -> Frame:
     fine = tracked.fine
     state = tracked.quality.value
     if state == LOST:
@@ -212,7 +212,7 @@ def _start_marks(attempt: Attempt) -> Marks:
     return Marks(uv, attempt.level[good].astype(np.uint8), first)
 
 
-def _waited(done: Run, frame: Frame, outcome: Outcome, before: int) -> Frame:
+def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Frame:
     """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
     trails, start = done.system.trails, done.settings.start
     if isinstance(outcome.attempt, Attempt):

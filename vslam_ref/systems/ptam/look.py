@@ -11,26 +11,26 @@ from vslam_ref.features.corners import HALF
 from vslam_ref.features.fast import Pixels
 from vslam_ref.features.small_images import LEAST_SIDE
 from vslam_ref.systems.ptam.settings import FeatureSettings
-from vslam_ref.systems.visual_map import Picture
+from vslam_ref.systems.visual_map import PreparedPicture
 
 
-def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Picture:
+def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> PreparedPicture:
     """Make a picture (H, W) of 8 bits ready to be looked at."""
     levels = pyramid(grey, settings.levels)
     limit = [settings.threshold_finest] + [settings.threshold] * (settings.levels - 1)
     corners = tuple(detect(image, t, settings.arc) for image, t in zip(levels, limit, strict=True))
     coarse = max(k for k, image in enumerate(levels) if k == 0 or min(image.shape) >= LEAST_SIDE)
-    return Picture(number, levels, corners, small_image(levels[coarse], coarse))
+    return PreparedPicture(number, levels, corners, small_image(levels[coarse], coarse))
 
 
-def peaks(picture: Picture, level: int, settings: FeatureSettings) -> Pixels:
+def peaks(picture: PreparedPicture, level: int, settings: FeatureSettings) -> Pixels:
     """Pixels (n, 2) of a level's corners that are stronger than their neighbours."""
     corners = picture.corners[level]
     score = corner_score(picture.levels[level], corners.xy, settings.arc)
     return corners.xy[is_peak(corners, score)]
 
 
-def strong_corners(picture: Picture, level: int, settings: FeatureSettings) -> IntArray:
+def strong_corners(picture: PreparedPicture, level: int, settings: FeatureSettings) -> IntArray:
     """Numbers of a level's corners that are peaks and strong, strongest first."""
     image, corners = picture.levels[level], picture.corners[level]
     peak = is_peak(corners, corner_score(image, corners.xy, settings.arc))

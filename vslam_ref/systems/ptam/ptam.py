@@ -22,13 +22,13 @@ from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.ptam import trails as trail_steps
 from vslam_ref.systems.ptam.look import prepare
-from vslam_ref.systems.ptam.mapper.mapper import Mapped, Measurements, adjust_all, map_keyframe
+from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, Measurements, adjust_all, map_keyframe
 from vslam_ref.systems.ptam.policy import KeyframePolicy
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked, Tracker
-from vslam_ref.systems.visual_map import Picture, VisualMap
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 
 
 class Pose(NamedTuple):
@@ -40,7 +40,7 @@ class Pose(NamedTuple):
     live: Array | None
 
 
-class Outcome(NamedTuple):
+class PictureOutcome(NamedTuple):
     """What became of one picture.
 
     Attributes
@@ -48,7 +48,7 @@ class Outcome(NamedTuple):
     number : int
     tracked : Tracked or None
         None before there is a map.
-    mapped : Mapped or None
+    mapped : MappedKeyframe or None
         If it became a keyframe.
     attempt : Attempt or str or None
         Of a start, if one was tried; a sentence where there was nothing to try.
@@ -56,7 +56,7 @@ class Outcome(NamedTuple):
 
     number: int
     tracked: Tracked | None = None
-    mapped: Mapped | None = None
+    mapped: MappedKeyframe | None = None
     attempt: Attempt | str | None = None
 
 
@@ -84,7 +84,7 @@ class Ptam:
         self.started_at: tuple[int, int] | None = None
         self.shape: tuple[int, ...] | None = None
 
-    def step(self, number: int, grey: ArrayLike) -> Outcome:
+    def step(self, number: int, grey: ArrayLike) -> PictureOutcome:
         """Take the next picture.
 
         Parameters
@@ -95,7 +95,7 @@ class Ptam:
 
         Returns
         -------
-        Outcome
+        PictureOutcome
 
         Raises
         ------
@@ -113,25 +113,25 @@ class Ptam:
 
     # --- before there is a map ----------------------------------------------------------------
 
-    def _before_the_map(self, picture: Picture) -> Outcome:
+    def _before_the_map(self, picture: PreparedPicture) -> PictureOutcome:
         s, f = self.settings.start, self.settings.features
         if self.trails is not None:
             self.trails = trail_steps.go_on(self.trails, picture, s)
         worn = self.trails is None or len(self.trails.now) < s.least_trails
         if worn or len(self.trails.pictures) > s.patience:  # type: ignore[union-attr]
             self.trails = trail_steps.begin(picture, s, f)
-            return Outcome(picture.number)
+            return PictureOutcome(picture.number)
         assert self.trails is not None
         if self.trails.length < s.least_motion or len(self.trails.pictures) <= s.least_pictures:
-            return Outcome(picture.number)
+            return PictureOutcome(picture.number)
         found = attempt(self.camera, self.trails, s, self.rng)
         if isinstance(found, str):
-            return Outcome(picture.number, attempt=found)
+            return PictureOutcome(picture.number, attempt=found)
         if not found.reason:
             self._start(found)
         elif found.agrees.sum() > s.keep * len(self.trails.now):
             self.trails = self.trails.only(found.row[found.agrees], found.uv_b[found.agrees])
-        return Outcome(picture.number, attempt=found)
+        return PictureOutcome(picture.number, attempt=found)
 
     def _start(self, found: Attempt) -> None:
         """Make the first map, and track the pictures between against it."""
@@ -156,7 +156,7 @@ class Ptam:
 
     # --- with a map ---------------------------------------------------------------------------
 
-    def _with_the_map(self, picture: Picture) -> Outcome:
+    def _with_the_map(self, picture: PreparedPicture) -> PictureOutcome:
         assert self.map is not None
         assert self.tracker is not None
         tracked = self.tracker.track(self.map, picture)
@@ -166,7 +166,7 @@ class Ptam:
             self._note(picture, tracked, live=True)
             if self.policy.wants(self.map, tracked):
                 mapped = self._keyframe(picture, tracked)
-        return Outcome(picture.number, tracked, mapped)
+        return PictureOutcome(picture.number, tracked, mapped)
 
     def _count(self, tracked: Tracked) -> None:
         """Remember of each point that it was looked for, and whether it was found."""
@@ -175,7 +175,7 @@ class Ptam:
         points["tried"][seen] += 1
         points["found"][seen[tracked.fine.weights > 0]] += 1
 
-    def _note(self, picture: Picture, tracked: Tracked, *, live: bool) -> None:
+    def _note(self, picture: PreparedPicture, tracked: Tracked, *, live: bool) -> None:
         """Remember a pose relative to the keyframe nearest to it."""
         assert self.map is not None
         T = tracked.T_cam_world
@@ -185,7 +185,7 @@ class Ptam:
         T_cam_kf = se3.compose(T, se3.inverse(self.map.T_kf_world[kf]))
         self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
 
-    def _keyframe(self, picture: Picture, tracked: Tracked) -> Mapped:
+    def _keyframe(self, picture: PreparedPicture, tracked: Tracked) -> MappedKeyframe:
         assert self.map is not None
         assert self.tracker is not None
         held = tracked.fine.weights > 0

@@ -10,7 +10,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
 from vslam_ref.systems.ptam.look import spread, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings, StartSettings
-from vslam_ref.systems.visual_map import Picture
+from vslam_ref.systems.visual_map import PreparedPicture
 
 LEVELS = (0, 1)
 """Of the pyramid, on which trails run: a bare scene has too few corners on one."""
@@ -22,14 +22,14 @@ class Trails:
 
     Attributes
     ----------
-    pictures : list of Picture
+    pictures : list of PreparedPicture
         From the first to the newest.
     level : ndarray of int64, shape (n,)
     first, now : ndarray, shape (n, 2)
         Pixels of level 0.
     """
 
-    pictures: list[Picture]
+    pictures: list[PreparedPicture]
     level: IntArray
     first: Array
     now: Array
@@ -45,7 +45,7 @@ class Trails:
         return Trails(self.pictures, self.level[rows], self.first[rows], now, self.speed[rows])
 
 
-def begin(picture: Picture, s: StartSettings, f: FeatureSettings) -> Trails:
+def begin(picture: PreparedPicture, s: StartSettings, f: FeatureSettings) -> Trails:
     """Take the strongest corners of a picture, spread over it."""
     level, place = [], []
     for each in LEVELS:
@@ -58,7 +58,7 @@ def begin(picture: Picture, s: StartSettings, f: FeatureSettings) -> Trails:
     return Trails([picture], np.concatenate(level), uv, uv.copy(), np.zeros_like(uv))
 
 
-def go_on(trails: Trails, picture: Picture, s: StartSettings) -> Trails:
+def go_on(trails: Trails, picture: PreparedPicture, s: StartSettings) -> Trails:
     """Follow all trails into the next picture; those that are lost end."""
     last = trails.pictures[-1]
     guess = trails.now + trails.speed
@@ -84,7 +84,7 @@ def from_the_first(trails: Trails, s: StartSettings) -> Array:
 
 
 def _followed(
-    a: Picture, b: Picture, level: IntArray, uv: Array, guess: Array, radius: float
+    a: PreparedPicture, b: PreparedPicture, level: IntArray, uv: Array, guess: Array, radius: float
 ) -> tuple[Array, BoolArray]:
     place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
     for each in LEVELS:

@@ -1,15 +1,15 @@
 """Floor 4: a map of keyframes and points that visual systems share."""
 
-from vslam_ref.systems.visual_map.adjust import Adjusted, adjust, local_active
-from vslam_ref.systems.visual_map.measure import Looks, Measured, look
+from vslam_ref.systems.visual_map.adjusting import Adjusted, adjust, local_active
+from vslam_ref.systems.visual_map.measure import Located, Looks, look
 from vslam_ref.systems.visual_map.visibility import Visible, templates, visible
-from vslam_ref.systems.visual_map.visual_map import Picture, VisualMap, neighbours, shared_points
+from vslam_ref.systems.visual_map.visual_map import PreparedPicture, VisualMap, neighbours, shared_points
 
 __all__ = [
     "Adjusted",
     "Looks",
-    "Measured",
-    "Picture",
+    "Located",
+    "PreparedPicture",
     "Visible",
     "VisualMap",
     "adjust",

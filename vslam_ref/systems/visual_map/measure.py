@@ -21,7 +21,7 @@ from vslam_ref.features import (
 )
 from vslam_ref.features.patch_search import AREA, LIMIT, variation
 from vslam_ref.systems.visual_map.visibility import Visible, sources, templates
-from vslam_ref.systems.visual_map.visual_map import Bytes, Picture, VisualMap
+from vslam_ref.systems.visual_map.visual_map import Bytes, PreparedPicture, VisualMap
 
 LEAST_RADIUS = 1.5
 """Pixels of the level."""
@@ -51,7 +51,7 @@ class Looks(NamedTuple):
 PLAIN = Looks()
 
 
-class Measured(NamedTuple):
+class Located(NamedTuple):
     """Places (n, 2), pixels of level 0, and which were found (n,)."""
 
     uv: Array
@@ -59,8 +59,8 @@ class Measured(NamedTuple):
 
 
 def look(
-    visual_map: VisualMap, seen: Visible, picture: Picture, radius: ArrayLike, looks: Looks = PLAIN
-) -> Measured:
+    visual_map: VisualMap, seen: Visible, picture: PreparedPicture, radius: ArrayLike, looks: Looks = PLAIN
+) -> Located:
     """Look for visible points in a picture.
 
     Parameters
@@ -68,14 +68,14 @@ def look(
     visual_map : VisualMap
     seen : Visible
         n points, where they are expected.
-    picture : Picture
+    picture : PreparedPicture
     radius : array_like, shape () or (n,)
         In pixels of level 0.
     looks : Looks
 
     Returns
     -------
-    Measured
+    Located
     """
     patches = templates(visual_map, sources(visual_map, seen.point), seen.A, seen.level)
     place, ok = seen.uv.copy(), np.zeros(len(seen.point), np.bool_)
@@ -96,12 +96,12 @@ def look(
         )
         place[rows] = finest_from_level(found.uv, level)
         ok[rows] = found.ok
-    return Measured(place, ok)
+    return Located(place, ok)
 
 
 def locate(
     image: Bytes, corners: Corners, patches: Templates, uv: Array, radius: Array, looks: Looks = PLAIN
-) -> Measured:
+) -> Located:
     """Look for patches around ``uv (n, 2)`` within ``radius (n,)``, all in pixels of one level."""
     patch = patches.patch
     place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
@@ -123,7 +123,7 @@ def locate(
     good = end.ok.copy()
     good[good] = alike(image, patch[rows[good]], end.uv[good], spread[rows[good]], looks)
     place[rows[good]], ok[rows[good]] = end.uv[good], True
-    return Measured(place, ok)
+    return Located(place, ok)
 
 
 def alike(image: Bytes, patch: Bytes, uv: Array, spread: Array, looks: Looks) -> BoolArray:

@@ -33,7 +33,7 @@ Rowlike = NDArray[Any]
 """Numbers of rows, or a mask of all."""
 
 
-class Picture(NamedTuple):
+class PreparedPicture(NamedTuple):
     """A picture as systems look at it.
 
     Attributes
@@ -131,7 +131,7 @@ class VisualMap:
         """Return that level of all keyframes, (K, H >> level, W >> level)."""
         return self._images[level]["image"]
 
-    def add_keyframe(self, T_kf_world: ArrayLike, picture: Picture) -> int:
+    def add_keyframe(self, T_kf_world: ArrayLike, picture: PreparedPicture) -> int:
         """Add a picture with its pose; return the keyframe's number."""
         pose = as_array("T_kf_world", T_kf_world, 4, 4)
         for rows, image in zip(self._images, picture.levels, strict=True):

@@ -18,7 +18,7 @@ camera's frame is x right, y down, z ahead.  With NumPy a picture of 640 x 480 t
 second, with Numba about a seventh of it.
 """
 
-from vslam_ref.worlds.rendered.record import Effects, RenderedScene, PointTracks
+from vslam_ref.worlds.rendered.record import Effects, PointTracks, RenderedScene
 from vslam_ref.worlds.rendered.scenes import NAMES, pinhole, scene, wide
 
 __all__ = ["NAMES", "Effects", "RenderedScene", "PointTracks", "pinhole", "scene", "wide"]

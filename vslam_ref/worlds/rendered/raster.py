@@ -96,7 +96,7 @@ class PlacedQuads(NamedTuple):
 
 
 def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> PlacedQuads:
-    """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is that of its :class:`RayTable`."""
+    """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is of its :class:`RayTable`."""
     extent = np.ascontiguousarray(textures.extent[quads.texture])
     R = se3.rotation(T_cam_world)
     corner = se3.act(T_cam_world, quads.corner)

@@ -8,9 +8,9 @@ module                  holds
 ``five_point``          ``five_point_essentials``: all essential matrices of many samples of five
 ``homography``          ``fit_homography``, ``apply_homography``, ``plane_homography``
 ``decompose``           ``essential_motions`` (four), ``homography_motions`` (two, with normals)
-``sampson``             signed distances: ``sampson``, ``sampson_with_jacobians`` of a relative pose and its
+``sampson_distance``    signed distances: ``sampson``, ``sampson_with_jacobians`` of a relative pose and its
                         five numbers, ``perturb``, ``essential_sampson``, ``homography_sampson``
-``cheirality``          ``cheirality``: squared distance of a pair from the nearest point in front; ``depths``
+``in_front``            ``cheirality``: squared distance of a pair from the nearest point in front; ``depths``
 ``consensus``           ``essential_consensus``, ``homography_consensus``: samples, MSAC, adaptive ``Draws``
 ``choice``              ``choose``: the cheapest of several motions, its rivals, or why it is refused
 ``degenerate``          ``degeneracy``: no parallax, pure rotation, a plane, or none of them
@@ -33,7 +33,6 @@ refinement. A numeric failure is a ``reason``, empty where all is well; input th
 ValueError.
 """
 
-from vslam_ref.geometry.multiview.two_views.cheirality import Cheirality, cheirality, depths
 from vslam_ref.geometry.multiview.two_views.choice import Choice, apart, choose
 from vslam_ref.geometry.multiview.two_views.consensus import (
     Consensus,
@@ -67,7 +66,8 @@ from vslam_ref.geometry.multiview.two_views.homography import (
     fit_homography,
     plane_homography,
 )
-from vslam_ref.geometry.multiview.two_views.sampson import (
+from vslam_ref.geometry.multiview.two_views.in_front import Cheirality, cheirality, depths
+from vslam_ref.geometry.multiview.two_views.sampson_distance import (
     SampsonJacobians,
     essential_sampson,
     homography_sampson,

@@ -1,7 +1,7 @@
 r"""One motion of many: by its cost on all pairs, with its rivals named.
 
 An essential matrix gives four motions, a homography two.  All are judged alike, by the truncated cost of
-:mod:`~vslam_ref.geometry.multiview.two_views.cheirality` per pair, in units of :math:`\sigma^2`.  A motion is
+:mod:`~vslam_ref.geometry.multiview.two_views.in_front` per pair, in units of :math:`\sigma^2`.  A motion is
 chosen only if it is clearly cheaper than every other: while a rival in another valley costs less than
 
 .. math:: 1.5\, C_{\text{best}} + 0.01 ,
@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma
-from vslam_ref.geometry.multiview.two_views.cheirality import cheirality
 from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION, truncated_cost
+from vslam_ref.geometry.multiview.two_views.in_front import cheirality
 
 RATIO, MARGIN = 1.5, 0.01
 """A rival is told apart if it costs at least RATIO times the best cost, and MARGIN sigma^2 a pair more."""

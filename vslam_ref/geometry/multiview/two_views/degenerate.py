@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma, homogeneous
-from vslam_ref.geometry.multiview.two_views.sampson import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
 
 MAP, LINES = 2, 3
 """Dimension of the manifold of pairs of a map from picture to picture, and of an epipolar geometry."""

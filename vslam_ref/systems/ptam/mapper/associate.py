@@ -6,11 +6,11 @@ import numpy as np
 
 from vslam_ref.arrays import IntArray
 from vslam_ref.systems.ptam.tracker.recover import picture_of
-from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, look, visible
+from vslam_ref.systems.visual_map import Looks, PreparedPicture, VisualMap, look, visible
 
 
 def look_again(
-    visual_map: VisualMap, kf: int, picture: Picture, points: IntArray, radius: float, looks: Looks
+    visual_map: VisualMap, kf: int, picture: PreparedPicture, points: IntArray, radius: float, looks: Looks
 ) -> IntArray:
     """Look in a keyframe for points (n,) that it does not see yet, within a radius in pixels.
 

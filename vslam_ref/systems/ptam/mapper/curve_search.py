@@ -27,7 +27,7 @@ PORTION = 4096
 """Pairs of patches that are compared together."""
 
 
-class Corner(NamedTuple):
+class CornerRays(NamedTuple):
     """Whole pixels of a level (n, 2), their bearings (n, 3) and d bearing / d pixel of level 0 (n, 3, 2)."""
 
     xy: Pixels
@@ -35,9 +35,9 @@ class Corner(NamedTuple):
     J_pixel: Array
     valid: BoolArray
 
-    def only(self, rows: IntArray) -> Corner:
+    def only(self, rows: IntArray) -> CornerRays:
         """Return some of them."""
-        return Corner(self.xy[rows], self.bearing[rows], self.J_pixel[rows], self.valid[rows])
+        return CornerRays(self.xy[rows], self.bearing[rows], self.J_pixel[rows], self.valid[rows])
 
 
 class OnCurve(NamedTuple):
@@ -47,10 +47,10 @@ class OnCurve(NamedTuple):
     cost: Array
 
 
-def with_bearings(camera: Camera, xy: Pixels, level: int) -> Corner:
+def with_bearings(camera: Camera, xy: Pixels, level: int) -> CornerRays:
     """Give corners of a level their rays."""
     ray = camera.unproject_with_jacobians(finest_from_level(xy, level))
-    return Corner(xy, ray.bearing, ray.J_pixel, ray.valid)
+    return CornerRays(xy, ray.bearing, ray.J_pixel, ray.valid)
 
 
 def essential(T_b_a: Array) -> Array:
@@ -67,7 +67,9 @@ class Gates(NamedTuple):
     limit: float
 
 
-def search_curve(patch: Bytes, a: Corner, image: Bytes, b: Corner, T_b_a: Array, gates: Gates) -> OnCurve:
+def search_curve(
+    patch: Bytes, a: CornerRays, image: Bytes, b: CornerRays, T_b_a: Array, gates: Gates
+) -> OnCurve:
     """Find for each patch the corner near its curve that looks most like it.
 
     Implements :eq:`eq-curve-distance`.
@@ -76,11 +78,11 @@ def search_curve(patch: Bytes, a: Corner, image: Bytes, b: Corner, T_b_a: Array,
     ----------
     patch : ndarray of uint8, shape (n, 8, 8)
         Around the corners ``a``.
-    a : Corner
+    a : CornerRays
         n corners of the first picture.
     image : ndarray of uint8, shape (H, W)
         The level of the second picture.
-    b : Corner
+    b : CornerRays
         m corners of it.
     T_b_a : ndarray, shape (4, 4)
         Pose of the second camera.
@@ -119,7 +121,7 @@ def _share_of_variation(a: Bytes, b: Bytes, row: IntArray, column: IntArray) -> 
 
 
 def _near_curve(
-    a: Corner, b: Corner, T_b_a: Array, distance: float, near: float
+    a: CornerRays, b: CornerRays, T_b_a: Array, distance: float, near: float
 ) -> tuple[IntArray, IntArray]:
     """Pairs (p,) of a point and a corner near its curve, in front of both cameras and not too close."""
     lines = a.bearing @ essential(T_b_a).T  # (n, 3): E a

@@ -12,7 +12,15 @@ from vslam_ref.estimation.robust import tuned
 from vslam_ref.systems.ptam.mapper.associate import look_again, look_in_neighbours, seldom_found
 from vslam_ref.systems.ptam.mapper.new_points import new_points
 from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.visual_map import Adjusted, Looks, Picture, VisualMap, adjust, local_active, neighbours
+from vslam_ref.systems.visual_map import (
+    Adjusted,
+    Looks,
+    PreparedPicture,
+    VisualMap,
+    adjust,
+    local_active,
+    neighbours,
+)
 
 
 class Measurements(NamedTuple):
@@ -23,7 +31,7 @@ class Measurements(NamedTuple):
     level: IntArray
 
 
-class Mapped(NamedTuple):
+class MappedKeyframe(NamedTuple):
     """What a keyframe brought.
 
     Attributes
@@ -47,8 +55,12 @@ class Mapped(NamedTuple):
 
 
 def map_keyframe(
-    visual_map: VisualMap, picture: Picture, T_cam_world: Array, seen: Measurements, settings: Settings
-) -> Mapped:
+    visual_map: VisualMap,
+    picture: PreparedPicture,
+    T_cam_world: Array,
+    seen: Measurements,
+    settings: Settings,
+) -> MappedKeyframe:
     """Take a picture with its pose ``T_cam_world (4, 4)`` into the map, and make the map better by it.
 
     Lengths have the map's own unit.  Implements A§2.2.2.1.
@@ -68,7 +80,7 @@ def map_keyframe(
         adjusted.append(adjust_all(visual_map, settings, s.global_steps))
     bad = seldom_found(visual_map, s.tries, s.found)
     visual_map.remove(bad)
-    return Mapped(kf, len(again), len(fresh), elsewhere, tuple(adjusted), len(bad))
+    return MappedKeyframe(kf, len(again), len(fresh), elsewhere, tuple(adjusted), len(bad))
 
 
 def adjust_local(visual_map: VisualMap, kf: int, settings: Settings) -> Adjusted:

@@ -15,10 +15,10 @@ from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views
 from vslam_ref.systems.ptam.look import peaks, spread, strong_corners
-from vslam_ref.systems.ptam.mapper.curve_search import Corner, Gates, search_curve, with_bearings
+from vslam_ref.systems.ptam.mapper.curve_search import CornerRays, Gates, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
 from vslam_ref.systems.ptam.tracker.recover import picture_of
-from vslam_ref.systems.visual_map import Looks, Picture, VisualMap, shared_points
+from vslam_ref.systems.visual_map import Looks, PreparedPicture, VisualMap, shared_points
 from vslam_ref.systems.visual_map.measure import locate
 from vslam_ref.systems.visual_map.visual_map import Bytes
 
@@ -37,7 +37,7 @@ class Side(NamedTuple):
     image : ndarray of uint8, shape (H, W)
     corners : Corners
         All of the level.
-    peaks : Corner
+    peaks : CornerRays
         Those that stand out among their neighbours, with rays.
     T_cam_world : ndarray, shape (4, 4)
         Lengths in the map's own unit.
@@ -47,11 +47,11 @@ class Side(NamedTuple):
     level: int
     image: Bytes
     corners: Corners
-    peaks: Corner
+    peaks: CornerRays
     T_cam_world: Array
 
 
-class Pairs(NamedTuple):
+class CurveMatches(NamedTuple):
     """Matches: ``row (n,)`` among the candidates, pixels of level 0 ``uv_a (n, 2)``, ``uv_b (n, 2)``."""
 
     row: IntArray
@@ -60,7 +60,7 @@ class Pairs(NamedTuple):
 
 
 def new_points(
-    visual_map: VisualMap, kf: int, picture: Picture, s: MapperSettings, f: FeatureSettings
+    visual_map: VisualMap, kf: int, picture: PreparedPicture, s: MapperSettings, f: FeatureSettings
 ) -> IntArray:
     """Add points that the newest keyframe is the first to explain; return their numbers (n,).
 
@@ -72,7 +72,7 @@ def new_points(
         Changed in place; lengths have its own unit.
     kf : int
         The keyframe.
-    picture : Picture
+    picture : PreparedPicture
         Its picture.
     s, f : MapperSettings, FeatureSettings
     """
@@ -95,7 +95,7 @@ def new_points(
     return np.concatenate(added)
 
 
-def _side(visual_map: VisualMap, kf: int, picture: Picture, level: int, f: FeatureSettings) -> Side:
+def _side(visual_map: VisualMap, kf: int, picture: PreparedPicture, level: int, f: FeatureSettings) -> Side:
     found = with_bearings(visual_map.camera, peaks(picture, level, f), level)
     T = visual_map.T_kf_world[kf]
     return Side(kf, level, picture.levels[level], picture.corners[level], found, T)
@@ -133,7 +133,7 @@ def free(visual_map: VisualMap, kf: int, xy: Pixels, level: int, spacing: float)
 
 def match(
     camera: Camera, xy: Pixels, a: Side, b: Side, near: float, s: MapperSettings, f: FeatureSettings
-) -> Pairs:
+) -> CurveMatches:
     """Corners (n, 2) of a in b: on their curve, refined, and found back in a.
 
     Implements :eq:`eq-search-back`.
@@ -150,7 +150,7 @@ def match(
 
     Returns
     -------
-    Pairs
+    CurveMatches
     """
     T_b_a = se3.compose(b.T_cam_world, se3.inverse(a.T_cam_world))
     asked = with_bearings(camera, xy, a.level)
@@ -170,11 +170,11 @@ def match(
         away = np.hypot(*(a.peaks.xy[home.corner] - xy[rows]).T)
         keep = here.inside & (home.corner >= 0) & (away <= s.back)
         rows, uv = rows[keep], uv[keep]
-    return Pairs(rows, finest_from_level(xy[rows], a.level), finest_from_level(uv, a.level))
+    return CurveMatches(rows, finest_from_level(xy[rows], a.level), finest_from_level(uv, a.level))
 
 
 def _triangulated(
-    visual_map: VisualMap, a: Side, b: Side, pairs: Pairs, s: MapperSettings
+    visual_map: VisualMap, a: Side, b: Side, pairs: CurveMatches, s: MapperSettings
 ) -> tuple[IntArray, IntArray]:
     """Add the points of matches that have depth; return their numbers and their rows among the candidates."""
     if len(pairs.row) == 0:

@@ -12,7 +12,7 @@ from vslam_ref.estimation.robust.scale import MAD_NORM_2D
 from vslam_ref.features.book import best_corner, refine_step, warped_patch, zmssd
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
-from vslam_ref.systems.visual_map import Picture
+from vslam_ref.systems.visual_map import PreparedPicture
 from vslam_ref.systems.visual_map.visual_map import Bytes, slopes
 
 C = tuned("tukey", 2).c
@@ -28,7 +28,7 @@ class Point(NamedTuple):
     u: Array
 
 
-class Seen(NamedTuple):
+class SeenPoint(NamedTuple):
     """A point that should be visible: expected pixel u (2,) of level 0, warp A (2, 2), level to look on."""
 
     point: Point
@@ -74,7 +74,7 @@ def level_for(A: Array, source: int) -> int:
     return level if level < 4 else -1
 
 
-def visible(camera: Camera, points: list[Point], T: Array, picture: Picture) -> list[Seen]:
+def visible(camera: Camera, points: list[Point], T: Array, picture: PreparedPicture) -> list[SeenPoint]:
     """Points that a camera at T (4, 4) should see, at least 5 pixels of their level inside.
 
     Implements :eq:`eq-search-level` and :eq:`eq-patch-affine`.
@@ -90,11 +90,11 @@ def visible(camera: Camera, points: list[Point], T: Array, picture: Picture) -> 
         x, y = on_level(at.uv, max(level, 0))
         w, h = width / 2 ** max(level, 0), height / 2 ** max(level, 0)
         if level >= 0 and 5 <= x <= w - 6 and 5 <= y <= h - 6:
-            seen.append(Seen(p, at.uv, A, level))
+            seen.append(SeenPoint(p, at.uv, A, level))
     return seen
 
 
-def template(seen: Seen) -> Bytes:
+def template(seen: SeenPoint) -> Bytes:
     """Patch of 8 x 8 pixels from the keyframe, as the level to look on should show it."""
     p = seen.point
     M = np.asarray(2.0 ** (seen.level - p.level) * np.linalg.inv(seen.A), np.float64)  # eq-sampling
@@ -137,7 +137,7 @@ def from_corner(image: Bytes, T: Bytes, corner: tuple[int, int]) -> Array | None
     return refined(image, T, start) if unlike(T, warped_patch(image, start, np.eye(2))) <= 0.5 else None
 
 
-def find(seen: Seen, picture: Picture, radius: float) -> Array | None:
+def find(seen: SeenPoint, picture: PreparedPicture, radius: float) -> Array | None:
     """Place (2,), pixels of level 0: refined from where it is expected, else from the corner most alike."""
     image, corners = picture.levels[seen.level], picture.corners[seen.level].xy
     T, u, reach = template(seen), on_level(seen.u, seen.level), max(radius / 2**seen.level, 1.5)
@@ -173,7 +173,7 @@ def tukey_step(camera: Camera, matches: list[Match], T: Array) -> tuple[Array, l
 # --- the two passes ---
 
 
-def choose(seen: list[Seen], most: int, coarse: bool, rng: np.random.Generator) -> list[Seen]:
+def choose(seen: list[SeenPoint], most: int, coarse: bool, rng: np.random.Generator) -> list[SeenPoint]:
     """At most so many, at random; the coarse pass takes levels 2 and 3 first, then 1, then 0."""
     order = [int(k) for k in rng.permutation(len(seen))]
     if coarse:
@@ -192,7 +192,12 @@ def quality(weights: list[float], levels: list[int]) -> str:
 
 
 def track(
-    camera: Camera, points: list[Point], picture: Picture, T_last: Array, v: Array, rng: np.random.Generator
+    camera: Camera,
+    points: list[Point],
+    picture: PreparedPicture,
+    T_last: Array,
+    v: Array,
+    rng: np.random.Generator,
 ) -> tuple[Array, str]:
     """Pose of the next picture and its worth, from T_last (4, 4) and v (6,), metres and radians."""
     T = se3.exp(v) @ T_last  # eq-a2-5

@@ -11,7 +11,7 @@ from vslam_ref.estimation.pose_tracking import TrackedPose, track_pose
 from vslam_ref.estimation.robust import tuned
 from vslam_ref.features import level_sigma
 from vslam_ref.systems.ptam.settings import TrackerSettings
-from vslam_ref.systems.visual_map import Looks, Picture, Visible, VisualMap, look, visible
+from vslam_ref.systems.visual_map import Looks, PreparedPicture, Visible, VisualMap, look, visible
 
 
 class Pass(NamedTuple):
@@ -44,7 +44,7 @@ class Pass(NamedTuple):
 
 def coarse(
     visual_map: VisualMap,
-    picture: Picture,
+    picture: PreparedPicture,
     T_guess: Array,
     radius: float,
     settings: TrackerSettings,
@@ -62,7 +62,7 @@ def coarse(
 
 def fine(
     visual_map: VisualMap,
-    picture: Picture,
+    picture: PreparedPicture,
     T_guess: Array,
     radius: float,
     settings: TrackerSettings,
@@ -90,7 +90,7 @@ def _coarsest(level: IntArray, most: int, rng: np.random.Generator) -> IntArray:
 
 def _pass(
     visual_map: VisualMap,
-    picture: Picture,
+    picture: PreparedPicture,
     T_guess: Array,
     seen: Visible,
     radius: float,

@@ -10,7 +10,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview.three_points import p3p
-from vslam_ref.systems.visual_map import Picture, VisualMap
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 
 DRAWS = 200
 LIMIT_PX = 3.0
@@ -25,14 +25,14 @@ class Known(NamedTuple):
     level: IntArray
 
 
-class Consensus(NamedTuple):
+class Agreed(NamedTuple):
     """Best T_cam_world (4, 4), metres, of many draws, and ok (n,): which matches agree with it."""
 
     T_cam_world: Array
     ok: BoolArray
 
 
-def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> Known:
+def follow_known(before: PreparedPicture, now: PreparedPicture, known: Known, radius: float) -> Known:
     """Follow points from one picture into another, each on its level; what was not found is left out.
 
     The radius is in pixels of level 0, but 4 of the level at least.
@@ -52,7 +52,7 @@ def follow_known(before: Picture, now: Picture, known: Known, radius: float) -> 
 
 def by_three_points(
     camera: Camera, X_world: Array, known: Known, rng: np.random.Generator, draws: int = DRAWS
-) -> Consensus | None:
+) -> Agreed | None:
     """Pose from three matches with which most of all agree; None if fewer than eight do.
 
     Implements :eq:`eq-recover-cost`, the least of many draws of three; ``X_world`` is (n, 3), metres.
@@ -72,7 +72,7 @@ def by_three_points(
     cost = np.minimum(error**2, 1.0).sum(1)
     best = int(np.argmin(cost))
     ok = error[best] < 1.0
-    return Consensus(T[best], ok) if np.count_nonzero(ok) >= 8 else None
+    return Agreed(T[best], ok) if np.count_nonzero(ok) >= 8 else None
 
 
 def known_in(visual_map: VisualMap, kf: int) -> Known:
@@ -82,15 +82,15 @@ def known_in(visual_map: VisualMap, kf: int) -> Known:
     return Known(seen["point"][rows], seen["uv"][rows], seen["level"][rows])
 
 
-def picture_of(visual_map: VisualMap, kf: int) -> Picture:
+def picture_of(visual_map: VisualMap, kf: int) -> PreparedPicture:
     """Return a keyframe as a picture."""
     levels = tuple(visual_map.image(level)[kf] for level in range(visual_map.levels))
-    return Picture(
+    return PreparedPicture(
         int(visual_map.keyframes["frame"][kf]), levels, visual_map.corners[kf], visual_map.small[kf]
     )
 
 
-def most_alike(visual_map: VisualMap, picture: Picture, count: int) -> IntArray:
+def most_alike(visual_map: VisualMap, picture: PreparedPicture, count: int) -> IntArray:
     """Keyframes whose small images differ least, without their means.
 
     Implements :eq:`eq-most-alike`, in grey levels squared; the count has no unit.

@@ -16,7 +16,7 @@ from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker import recover
 from vslam_ref.systems.ptam.tracker.coarse_fine import Pass, coarse, fine
 from vslam_ref.systems.ptam.tracker.quality import Quality, quality
-from vslam_ref.systems.visual_map import Looks, Picture, VisualMap
+from vslam_ref.systems.visual_map import Looks, PreparedPicture, VisualMap
 
 
 class Tracked(NamedTuple):
@@ -52,7 +52,7 @@ class Tracker:
     rng: np.random.Generator
     motion: DecayingVelocity
     T_last: Array
-    last: Picture | None = None
+    last: PreparedPicture | None = None
     known: recover.Known | None = None
     lost: int = 0
 
@@ -62,7 +62,7 @@ class Tracker:
         f = self.settings.features
         return Looks(f.limit, f.measure, f.absolute, f.first_refine)
 
-    def track(self, visual_map: VisualMap, picture: Picture) -> Tracked:
+    def track(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked:
         """Find the pose of the next picture; the map is only read.
 
         Implements A§2.2.1, tracking in two passes.
@@ -83,7 +83,7 @@ class Tracker:
         nowhere = Pass(none, np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0), pose)
         return Tracked(self.T_last, Quality.LOST, nowhere, "none")
 
-    def _predicted(self, visual_map: VisualMap, picture: Picture) -> Tracked | None:
+    def _predicted(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked | None:
         """From a guess: the coarse pass tells whether it was good."""
         s = self.settings.tracker
         best: tuple[int, Array, str] | None = None
@@ -98,12 +98,14 @@ class Tracker:
             return None
         return self._finely(visual_map, picture, best[1], s.fine_radius, best[2])
 
-    def _finely(self, visual_map: VisualMap, picture: Picture, T: Array, radius: float, way: str) -> Tracked:
+    def _finely(
+        self, visual_map: VisualMap, picture: PreparedPicture, T: Array, radius: float, way: str
+    ) -> Tracked:
         s = self.settings.tracker
         second = fine(visual_map, picture, T, radius, s, self.looks, self.rng)
         return Tracked(second.pose.T_cam_world, quality(second, s), second, way)
 
-    def _guesses(self, visual_map: VisualMap, picture: Picture):  # type: ignore[no-untyped-def]
+    def _guesses(self, visual_map: VisualMap, picture: PreparedPicture):  # type: ignore[no-untyped-def]
         """Guesses of the pose, each with the radius in which to look."""
         radius = self.settings.tracker.radius
         yield "velocity", self.motion.predict(self.T_last), radius[0]
@@ -119,7 +121,7 @@ class Tracker:
         yield "small image", turned, radius[1]
         yield "wide", turned, radius[2]
 
-    def _recovered(self, visual_map: VisualMap, picture: Picture) -> Tracked | None:
+    def _recovered(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked | None:
         """Follow patches from the last picture that was tracked, else from the keyframes most alike."""
         s = self.settings.tracker
         if self.lost == 0 and self.last is not None and self.known is not None:
@@ -135,7 +137,12 @@ class Tracker:
         return None
 
     def _from(
-        self, visual_map: VisualMap, picture: Picture, there: Picture, known: recover.Known, way: str
+        self,
+        visual_map: VisualMap,
+        picture: PreparedPicture,
+        there: PreparedPicture,
+        known: recover.Known,
+        way: str,
     ) -> Tracked | None:
         s = self.settings.tracker
         alive = visual_map.alive[known.point]
@@ -152,7 +159,7 @@ class Tracker:
         enough = found.fine.inliers >= s.recover_inliers and found.quality is not Quality.LOST
         return found if enough else None
 
-    def _remember(self, picture: Picture, found: Tracked) -> None:
+    def _remember(self, picture: PreparedPicture, found: Tracked) -> None:
         """Go on from here; after a lost picture, from the last that was not."""
         if found.quality is Quality.LOST:
             self.lost += 1

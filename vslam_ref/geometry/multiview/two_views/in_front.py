@@ -25,7 +25,7 @@ from vslam_ref.arrays import Array, BoolArray, as_array, times
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview.epipolar import essential_from_motion
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma, homogeneous
-from vslam_ref.geometry.multiview.two_views.sampson import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
 
 
 class Cheirality(NamedTuple):
