@@ -156,6 +156,20 @@ def test_what_a_reader_of_the_numbers_should_know_is_noted(
     assert any("one of many: the points lie on one line" in note for note in notes)
 
 
+def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """25 poses of one stamp, as a phone's clip has them: 24 of them are far off, and do not count."""
+    true = [f"{k / 30!r} {k} {k * k} 0 0 0 0 1" for k in range(40)]
+    found = [*true[:2], *(f"{1 / 30!r} 99 99 99 0 0 0 1" for _ in range(24)), *true[2:]]
+    (tmp_path / "t.txt").write_text("\n".join(true))
+    (tmp_path / "e.txt").write_text("\n".join(found))
+    for names in (("e.txt", "t.txt"), ("t.txt", "e.txt")):
+        assert run(*(tmp_path / name for name in names), "--align", "none") == 0
+        out = capsys.readouterr().out
+        assert re.search(r"^pairs of poses +40$", out, re.MULTILINE)
+        assert re.search(r"^ATE, largest +0\.000000", out, re.MULTILINE)
+        assert "24 pose(s) with the time of the pose before; of equal times only the first is paired" in out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

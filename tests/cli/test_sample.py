@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,10 +15,12 @@ from vslam_ref.commands.samples import KINDS
 from vslam_ref.datasets import carmen, grid_files, mrclam, noise
 from vslam_ref.datasets.bundle_files import read_bal, read_bundle, read_colmap
 from vslam_ref.datasets.calibration_files import read_opencv
+from vslam_ref.datasets.sequences import open_sequence
 from vslam_ref.estimation.bundle import bundle_adjust
 from vslam_ref.estimation.bundle.covariance import covariance
 from vslam_ref.grids.log_odds import OCCUPIED
 from vslam_ref.systems.slam_log.timeline import control_increments
+from vslam_ref.worlds import rendered
 from vslam_ref.worlds.bundles import nearest_of_family
 from vslam_ref.worlds.floor_plan.crowd import nearest_on_segments
 from vslam_ref.worlds.floor_plan.robot import drive
@@ -217,3 +220,46 @@ def test_verify_passes_the_adapter_and_names_its_mistake(
     assert truth(samples, "adapter")["mistake"] in capsys.readouterr().out
     assert main(["verify", "--program", program, *topics]) == 1
     assert "se3.exp" in capsys.readouterr().out
+
+
+def test_the_film_is_what_its_camera_sees(samples: Path) -> None:
+    """Points of picture 0 are projected, by the files' camera and poses, to where OpenCV finds them."""
+    sequence = open_sequence(samples / "video")
+    told = truth(samples, "video")
+    assert (len(sequence), sequence.size, sequence.notes) == (told["pictures"], (320, 240), ())
+    assert sequence.camera is not None
+    assert sequence.camera.params.tolist() == told["camera"]
+    assert sequence.truth is not None
+    way = np.linalg.norm(np.diff(sequence.truth.t_world_body, axis=0), axis=1).sum()
+    assert way == pytest.approx(told["path_m"], rel=1e-12)
+    assert 0.15 < way < 0.6
+    scene = rendered.scene(told["scene"], told["scene_seed"], size=(320, 240), frames=len(sequence))
+    np.testing.assert_array_equal(sequence.image(3).grey, scene.frame(3))
+    R, t = sequence.truth.R_world_body, sequence.truth.t_world_body
+    uv = cv2.goodFeaturesToTrack(sequence.image(0).grey, 80, 0.05, 10).reshape(-1, 2)
+    X = scene.surface(0, uv)
+    seen = sequence.camera.project((X - t[10]) @ R[10]).uv
+    found, status, _ = cv2.calcOpticalFlowPyrLK(
+        sequence.image(0).grey,
+        sequence.image(10).grey,
+        uv[:, None].copy(),
+        None,
+        winSize=(15, 15),
+        maxLevel=2,
+    )
+    off = np.linalg.norm(found[:, 0] - seen, axis=1)[status.ravel() == 1]
+    assert len(off) > 40
+    assert np.median(off) < 0.3  # pixels; the points move by some 10
+
+
+def test_the_film_as_a_video(samples: Path) -> None:
+    """The same pictures: JPEG changes grey values by a few levels; times are whole milliseconds."""
+    folder = open_sequence(samples / "video")
+    film = open_sequence(samples / "video" / "film.avi", camera=samples / "video" / "calib.txt")
+    assert (film.layout, len(film), film.camera) == ("video", len(folder), folder.camera)
+    np.testing.assert_allclose(film.times, folder.times, atol=1e-3)
+    for k in (0, 40):
+        a, b = folder.image(k).grey, film.image(k).grey
+        assert a is not None
+        assert b is not None
+        assert np.abs(a.astype(int) - b).mean() < 4

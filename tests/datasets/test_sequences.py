@@ -20,6 +20,7 @@ from vslam_ref.datasets.text import FormatError
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Fov, Pinhole, Radtan
 from vslam_ref.support.errors import InputError
+from vslam_ref.worlds.rendered import scene
 
 FIRST_TIME = {"plain": 0.0, "kitti": 0.0, "tum": 1341847980.72, "euroc": START_NS / 1e9, "7scenes": 0.0}
 STEP = {"plain": 0.05, "kitti": 0.1, "tum": 0.05, "euroc": 0.05, "7scenes": 1 / 30}
@@ -576,6 +577,36 @@ def test_what_is_no_video_is_refused(
     with pytest.raises(FormatError, match=words):
         open_sequence(path)
     assert capfd.readouterr().err == ""  # the decoder's words stay inside
+
+
+# --- scenes
+
+
+def test_a_rendered_scene_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sequence = open_sequence("rotation:3")
+    made = scene("rotation", 3)
+    assert (sequence.layout, sequence.size, len(sequence), sequence.notes) == (
+        "rendered",
+        (640, 480),
+        300,
+        (),
+    )
+    assert sequence.camera == made.camera
+    np.testing.assert_array_equal(sequence.times, made.times)
+    assert sequence.pairs().truth.tolist() == list(range(300))
+    np.testing.assert_allclose(poses(sequence)[1], made.trajectory().t_world_body, atol=1e-15)
+    np.testing.assert_array_equal(sequence.image(7).grey, made.frame(7))
+    assert sequence.image(7).colour is None
+    camera = tmp_path / "calib.txt"
+    camera.write_text(CALIB)
+    with pytest.raises(InputError, match="scene rotation has its own camera: leave --camera out"):
+        open_sequence("rotation", camera=camera)
+    for wrong in ("rotation:", "rotation:x", "rotation:-1", "rotation:1:2"):
+        with pytest.raises(InputError, match="no folder, video, scene or data set"):
+            open_sequence(wrong)
+    put(tmp_path / "rotation", LAYOUTS["plain"]())  # a folder of that name goes before
+    assert open_sequence("rotation").layout == "plain"
 
 
 # --- real data: numbers that their READMEs publish

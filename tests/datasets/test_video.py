@@ -125,3 +125,19 @@ def test_a_browser_plays_it(tmp_path: Path) -> None:
     assert error == 0
     assert ready >= 2
     assert width == 320
+
+
+def test_an_avi_has_its_pictures_and_the_same_bytes_each_time(tmp_path: Path) -> None:
+    """RIFF with form AVI (Microsoft's definition), codec MJPG; JPEG keeps flat areas within 4 of 255."""
+    ramp = np.tile(np.arange(64, dtype=np.uint8)[:, None] * 3, (48, 1, 3))
+    for name in ("a.avi", "b.avi"):
+        with video.avi(tmp_path / name) as add:
+            for k in range(4):
+                add(ramp + np.uint8(10 * k))
+    data = (tmp_path / "a.avi").read_bytes()
+    assert (data[:4], data[8:12]) == (b"RIFF", b"AVI ")
+    assert b"MJPG" in data[:400]
+    assert data == (tmp_path / "b.avi").read_bytes()
+    frames = read(tmp_path / "a.avi")
+    assert len(frames) == 4
+    assert np.abs(frames[3].astype(int) - ramp - 30).mean() < 4

@@ -46,16 +46,19 @@ def cache_folder() -> str | None:
     return None
 
 
-def njit(*, cache):
-    """Compile at the first call, as ``numba.njit`` does, and keep the code in :func:`cache_folder`."""
+def njit(*, cache, error_model="python"):
+    """Compile at the first call, as ``numba.njit`` does, and keep the code in :func:`cache_folder`.
+
+    With ``error_model="numpy"`` a division by zero is not looked for, which costs a branch each time.
+    """
 
     def declare(function):
         folder, before = cache_folder(), CONFIG.CACHE_DIR
         if folder is None:
-            return numba.njit(function)
+            return numba.njit(error_model=error_model)(function)
         try:
             CONFIG.CACHE_DIR = folder  # read when the function is declared
-            return numba.njit(cache=cache)(function)
+            return numba.njit(cache=cache, error_model=error_model)(function)
         finally:
             CONFIG.CACHE_DIR = before
 
@@ -72,11 +75,11 @@ def changed(ndim, dtype=types.float64):
     return types.Array(dtype, ndim, "A")
 
 
-def kernel(*arguments, returns=types.void):
+def kernel(*arguments, returns=types.void, error_model="python"):
     """Declare a kernel with one signature, to be compiled by :func:`compiled`."""
 
     def declare(function):
-        dispatcher: Any = njit(cache=True)(function)
+        dispatcher: Any = njit(cache=True, error_model=error_model)(function)
         dispatcher.signature = returns(*arguments)
         return dispatcher
 

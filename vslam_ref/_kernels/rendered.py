@@ -48,15 +48,21 @@ def nearest_of(xn, column, row, homography, extent, box):
     """Twin of :func:`vslam_ref.worlds.rendered.raster.nearest_of`."""
     quad = np.full(xn.shape[0], -1, np.int32)
     inverse_depth = np.zeros(xn.shape[0])
+    candidate = np.empty(homography.shape[0], np.int64)
+    count, u, v = 0, np.int64(-1), np.int64(-1)
     for n in range(xn.shape[0]):
-        x, y, u, v = xn[n, 0], xn[n, 1], column[n], row[n]
-        for q in range(homography.shape[0]):
-            if u < box[q, 0] or u >= box[q, 1] or v < box[q, 2] or v >= box[q, 3]:
-                continue
-            H = homography[q]
-            w = H[2, 0] * x + H[2, 1] * y + H[2, 2]
-            a = H[0, 0] * x + H[0, 1] * y + H[0, 2]
-            b = H[1, 0] * x + H[1, 1] * y + H[1, 2]
+        if n == 0 or column[n] != u or row[n] != v:  # rays of one pixel come one after the other
+            count, u, v = 0, column[n], row[n]
+            for q in range(homography.shape[0]):
+                if box[q, 0] <= u and u < box[q, 1] and box[q, 2] <= v and v < box[q, 3]:
+                    candidate[count] = q
+                    count += 1
+        x, y = xn[n, 0], xn[n, 1]
+        for k in range(count):
+            q = candidate[k]
+            w = homography[q, 2, 0] * x + homography[q, 2, 1] * y + homography[q, 2, 2]
+            a = homography[q, 0, 0] * x + homography[q, 0, 1] * y + homography[q, 0, 2]
+            b = homography[q, 1, 0] * x + homography[q, 1, 1] * y + homography[q, 1, 2]
             inside = a >= 0 and a <= extent[q, 0] * w and b >= 0 and b <= extent[q, 1] * w
             if inside and w > inverse_depth[n] and w < 1 / NEAR:
                 inverse_depth[n] = w
@@ -64,7 +70,7 @@ def nearest_of(xn, column, row, homography, extent, box):
     return quad, inverse_depth
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bilinear(texels, table, t, level, a, b):
     """Level of texture t at column a and row b of its finest level, texels."""
     begin, height, width = table[t, level, 0], table[t, level, 1], table[t, level, 2]
@@ -82,7 +88,7 @@ def _bilinear(texels, table, t, level, a, b):
     return upper + v * (r + u * (s - r) - upper)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _footprint(p_u, p_v, q_u, q_v, most):
     """Level, probes and the longer side (2,) of a patch."""
     p, r, q = p_u * p_u + p_v * p_v, q_u * q_u + q_v * q_v, p_u * q_u + p_v * q_v
@@ -102,7 +108,7 @@ def _footprint(p_u, p_v, q_u, q_v, most):
     return level, probes, x * scale, y * scale
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _sample(texels, table, t, level, a, b):
     """Grey value of texture t between two levels."""
     low = np.int64(level)

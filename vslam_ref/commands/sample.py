@@ -35,6 +35,7 @@ MAKERS = {
     "boards": "boards:make",
     "trajectory": "trajectory:make",
     "adapter": "adapter:make",
+    "video": "video:make",
 }
 """Kind -> module and function in ``commands.samples``."""
 LIST = "sample.json"

@@ -1,4 +1,4 @@
-"""Pictures as a video file that a browser plays: WebM with VP8."""
+"""Pictures as a video file: WebM with VP8, which a browser plays, or AVI with a JPEG for each picture."""
 
 from __future__ import annotations
 
@@ -44,6 +44,22 @@ def webm(path: Path, size: str = "small", fps: float = 10.0) -> Iterator[Film]:
     ValueError
         If a picture has another size than the first, the size is unknown, or this OpenCV writes no WebM.
     """
+    with _written(path, "VP80", size, fps) as film:
+        yield film
+
+
+@contextmanager
+def avi(path: Path, fps: float = 30.0) -> Iterator[Film]:
+    """Write pictures of one size to an AVI file, each as a JPEG: larger than WebM, the same bytes each time.
+
+    Parameters and errors are those of :func:`webm`; the size is "full".
+    """
+    with _written(path, "MJPG", "full", fps) as film:
+        yield film
+
+
+@contextmanager
+def _written(path: Path, code: str, size: str, fps: float) -> Iterator[Film]:
     import cv2
 
     if size not in SIZES[:-1]:
@@ -55,9 +71,9 @@ def webm(path: Path, size: str = "small", fps: float = 10.0) -> Iterator[Film]:
         if writer is None:
             given, shape = picture.shape, _even(picture.shape, size)
             with _quiet():  # it says that it knows no such tag in such a file, and writes it
-                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), fps, shape)
+                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*code), fps, shape)
             if not writer.isOpened():
-                raise ValueError(f"{path}: this OpenCV writes no WebM video")
+                raise ValueError(f"{path}: this OpenCV writes no {path.suffix[1:]} video")
         if picture.shape != given:
             raise ValueError(f"a picture of {picture.shape} in a film of {given}: all must have one size")
         shrink = shape[0] < picture.shape[1]

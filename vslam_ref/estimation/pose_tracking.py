@@ -19,10 +19,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, as_array
-from vslam_ref.estimation.robust import L2, Loss, norm_scale, tuned
+from vslam_ref.estimation.robust import L2, Loss, Tukey, norm_scale, tuned
 from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.cameras import Camera, Pinhole
+from vslam_ref.geometry.cameras.projection import pose_jacobian
 
 STEPS = 10
 LEAST_SIGMA = 0.4
@@ -118,17 +120,54 @@ def track_pose(
     if not (np.isfinite(root) & (root > 0)).all():
         raise ValueError("sigma_px must be finite and more than 0")
     rho = tuned("tukey", 2) if loss is None else loss
+    if isinstance(camera, Pinhole) and isinstance(rho, Tukey) and np.isfinite(rho.c):
+        T, w, H, last = _pinhole_steps(camera.params, T, X, u, root, rho.c, steps, least_sigma)
+        found = _Steps(T, w, float(last[0]), H, int(last[1]))
+    else:
+        found = _steps(camera, T, X, u, root, rho, steps, least_sigma)
+    return _result(found)
+
+
+def _result(found: _Steps) -> TrackedPose:
+    cov: Array = np.diag(np.full(6, np.inf))
+    if found.trouble == FINE:
+        cov = np.asarray(found.sigma**2 * np.linalg.inv(found.H))
+    agree = f"{np.count_nonzero(found.weights)} measurements agree: a pose needs at least {LEAST_POINTS}"
+    reason = {FINE: "", FEW: agree, UNDETERMINED: "the points do not determine the pose"}[found.trouble]
+    return TrackedPose(found.T_cam_world, found.weights, found.sigma, cov, reason)
+
+
+class _Steps(NamedTuple):
+    """Where the steps led: pose (4, 4), weights (N,), scale, normal matrix (6, 6), and what went wrong."""
+
+    T_cam_world: Array
+    weights: Array
+    sigma: float
+    H: Array
+    trouble: int
+
+
+@accelerated("pose:pinhole_steps")
+def _pinhole_steps(
+    K: Array, T_start: Array, X: Array, u: Array, root: Array, c: float, steps: int, least: float
+) -> tuple[Array, Array, Array, Array]:
+    """Pose, weights, normal matrix, (scale, trouble) with a pinhole K (4,) and Tukey's constant c."""
+    found = _steps(Pinhole.from_params(K), T_start, X, u, root, Tukey(c), steps, least)
+    return found.T_cam_world, found.weights, found.H, np.array([found.sigma, found.trouble])
+
+
+def _steps(
+    camera: Camera, T: Array, X: Array, u: Array, root: Array, loss: Loss, steps: int, least_sigma: float
+) -> _Steps:
+    """Reweighted steps; the last round only weighs."""
     for _ in range(steps):
-        at = _weighed(camera, X, u, root, T, rho, least_sigma)
-        if at.reason:
-            return TrackedPose(T, at.weights, at.sigma, np.diag(np.full(6, np.inf)), at.reason)
+        at = _weighed(camera, X, u, root, T, loss, least_sigma)
+        if at.trouble != FINE:
+            return _Steps(T, at.weights, at.sigma, at.H, at.trouble)
         mu = -np.linalg.solve(at.H, at.g)
         T = se3.perturb(T, mu)
-    end = _weighed(camera, X, u, root, T, rho, least_sigma)
-    if end.reason:
-        return TrackedPose(T, end.weights, end.sigma, np.diag(np.full(6, np.inf)), end.reason)
-    cov: Array = end.sigma**2 * np.linalg.inv(end.H)
-    return TrackedPose(T, end.weights, end.sigma, cov, "")
+    at = _weighed(camera, X, u, root, T, loss, least_sigma)
+    return _Steps(T, at.weights, at.sigma, at.H, at.trouble)
 
 
 class _Weighed(NamedTuple):
@@ -138,9 +177,10 @@ class _Weighed(NamedTuple):
     g: Array
     weights: Array
     sigma: float
-    reason: str
+    trouble: int
 
 
+FINE, FEW, UNDETERMINED = 0, 1, 2
 LEAST_POINTS = 4
 """Fewer measurements with weight leave no redundancy worth the name."""
 WORST = 1e12
@@ -151,24 +191,24 @@ def _weighed(
     camera: Camera, X: Array, u: Array, root: Array, T: Array, loss: Loss, least_sigma: float
 ) -> _Weighed:
     """Errors, scale, weights and normal equations at a pose."""
-    at = camera.pixel_from_world_with_jacobians(T, X)
+    X_cam = se3.act(T, X)
+    at = camera.project_with_jacobians(X_cam)
     e = np.where(at.valid[:, None], (at.uv - u) * root[:, None], 0.0)
     sigma = max(norm_scale(e[at.valid]).sigma, least_sigma) if at.valid.any() else np.inf
     size = np.hypot(e[:, 0], e[:, 1])
     scaled = loss if isinstance(loss, L2) or not np.isfinite(sigma) else loss.scaled(sigma)
     w = np.where(at.valid, scaled.weight(size), 0.0)
-    J = at.J_pose * root[:, None, None]
-    Jw = (J * w[:, None, None]).reshape(-1, 6)
-    H = Jw.T @ J.reshape(-1, 6)  # eq-track-normal
+    J = (pose_jacobian(at.J_point, X_cam) * root[:, None, None]).reshape(-1, 6)
+    Jw = J * np.repeat(w, 2)[:, None]
+    H = Jw.T @ J  # eq-track-normal
     g = Jw.T @ e.ravel()
     return _Weighed(H, g, w, sigma, _trouble(H, w))
 
 
-def _trouble(H: Array, w: Array) -> str:
-    """Why normal equations have no answer, or nothing."""
+def _trouble(H: Array, w: Array) -> int:
+    """What keeps normal equations from an answer."""
     if np.count_nonzero(w) < LEAST_POINTS:
-        return f"{np.count_nonzero(w)} measurements agree: a pose needs at least {LEAST_POINTS}"
+        return FEW
     d = np.sqrt(np.diag(H))
-    if not (d > 0).all() or np.linalg.cond(H / d[:, None] / d) > WORST:
-        return "the points do not determine the pose"
-    return ""
+    determined = (d > 0).all() and np.linalg.cond(H / d[:, None] / d) <= WORST
+    return FINE if determined else UNDETERMINED

@@ -71,7 +71,7 @@ def open_sequence(
     Returns
     -------
     Sequence
-        No picture has been decoded yet, except those of a video, once, to count them.
+        One picture has been decoded to see its size; those of a video all, once, to count them.
 
     Raises
     ------

@@ -82,10 +82,31 @@ class Ptam:
         self.policy = KeyframePolicy(s.keyframe)
         self.poses: dict[int, Pose] = {}
         self.started_at: tuple[int, int] | None = None
+        self.shape: tuple[int, ...] | None = None
 
     def step(self, number: int, grey: ArrayLike) -> Outcome:
-        """Take the next picture (H, W) of 8 bits."""
+        """Take the next picture.
+
+        Parameters
+        ----------
+        number : int
+            Its number in the sequence; each comes once.
+        grey : array_like of uint8, shape (H, W)
+
+        Returns
+        -------
+        Outcome
+
+        Raises
+        ------
+        ValueError
+            If it is not grey with 8 bits, or has another size than the pictures before.
+        """
+        shape = np.shape(grey)
+        if self.shape not in (None, shape):
+            raise ValueError(f"picture {number} has shape {shape}: the ones before had {self.shape}")
         picture = prepare(number, grey, self.settings.features)
+        self.shape = shape
         if self.map is None:
             return self._before_the_map(picture)
         return self._with_the_map(picture)

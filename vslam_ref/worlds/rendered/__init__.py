@@ -14,8 +14,8 @@
 Everything is exact but the grey values: poses are those of a function of time, depths those of planes, and a
 point's pixel is the camera's own projection.  Grey values are means over each pixel's footprint, so corners
 stay where their points are projected, which a test measures.  Lengths are real metres; z points up, and a
-camera's frame is x right, y down, z ahead.  With NumPy a picture of 640 x 480 takes about half a second,
-with Numba a fifteenth of it.
+camera's frame is x right, y down, z ahead.  With NumPy a picture of 640 x 480 takes a quarter of a
+second, with Numba about a seventh of it.
 """
 
 from vslam_ref.worlds.rendered.scene import Effects, Scene, Tracks

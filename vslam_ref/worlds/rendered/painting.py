@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.worlds.pictures import Wall, picture
 from vslam_ref.worlds.rendered.textures import MULTIPLE, Bytes
 
 Rng = np.random.Generator
@@ -94,17 +93,28 @@ def shapes(
     turned : bool
         Whether they are turned.
     """
-    middle = rng.uniform((0, 0), shape[::-1], (count, 2))
     low, high = np.log(sizes)
+    middle = rng.uniform((0, 0), shape[::-1], (count, 2))
     half = np.exp(rng.uniform(float(low), float(high), count))[:, None] * rng.uniform(0.6, 1.6, (count, 2))
-    order = np.argsort(-half.max(1), kind="stable")
     angle = rng.uniform(0, np.pi, count) if turned else np.zeros(count)
+    grey = rng.uniform(*greys, count)
+    canvas = np.full(shape, ground)
+    for k in np.argsort(-half.max(1), kind="stable"):  # the large ones first
+        _rectangle(canvas, middle[k], half[k], float(angle[k]), float(grey[k]))
+    return canvas
+
+
+def _rectangle(canvas: Array, middle: Array, half: Array, angle: float, grey: float) -> None:
+    """Paint a turned rectangle on a canvas, in place; its edges change over two texels."""
     c, s = np.cos(angle), np.sin(angle)
-    R = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
-    corner = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    vertex = middle[:, None] + np.einsum("kij,knj->kni", R, corner * half[:, None])
-    wall = Wall(vertex[order], rng.uniform(*greys, count)[order], ground)
-    return picture(wall, size=shape[::-1]).astype(np.float64)
+    reach = np.abs([[c, s], [s, c]]) @ half + 1.0
+    left, top = np.maximum(np.ceil(middle - reach), 0).astype(int)
+    right, bottom = np.floor(middle + reach).astype(int) + 1
+    part = canvas[top:bottom, left:right]
+    x, y = np.arange(left, left + part.shape[1]) - middle[0], np.arange(top, top + part.shape[0]) - middle[1]
+    along, across = np.add.outer(s * y, c * x), np.add.outer(c * y, -s * x)
+    inside = np.minimum(half[0] - np.abs(along), half[1] - np.abs(across))
+    part += np.minimum(np.maximum(0.5 * inside + 0.5, 0.0), 1.0) * (grey - part)
 
 
 def wood(rng: Rng, shape: tuple[int, int], grey: float = 150.0) -> Bytes:

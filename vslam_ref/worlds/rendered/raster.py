@@ -97,7 +97,7 @@ class Placed(NamedTuple):
 
 def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> Placed:
     """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is that of its :class:`Rays`."""
-    extent = textures.extent[quads.texture]
+    extent = np.ascontiguousarray(textures.extent[quads.texture])
     R = se3.rotation(T_cam_world)
     corner = se3.act(T_cam_world, quads.corner)
     side = quads.side @ R.T
@@ -242,8 +242,10 @@ def render(quads: Quads, textures: Textures, rays: Rays, T_cam_world: Array) -> 
     border = borders(quad)
     row, column = np.repeat(border // width, FINE * FINE), np.repeat(border % width, FINE * FINE)
     offset = (np.arange(FINE) - (FINE - 1) / 2) / FINE
-    inside = np.stack(np.meshgrid(offset, offset), -1).reshape(-1, 2)  # of a pixel, pixels
-    finer = (xn[border, None] + np.einsum("nij,kj->nki", spread[border], inside)).reshape(-1, 2)
+    du, dv = np.meshgrid(offset, offset)  # of rays in a pixel, pixels
+    step = spread[border][:, None]
+    finer = xn[border, None] + du.reshape(-1, 1) * step[..., 0] + dv.reshape(-1, 1) * step[..., 1]
+    finer = finer.reshape(-1, 2)
     first, _ = nearest_of(finer, column, row, *at)
     spreads = np.repeat(spread[border], FINE * FINE, 0)
     grey[border] = shade(finer, spreads, first, *painted).reshape(-1, FINE * FINE).mean(1)

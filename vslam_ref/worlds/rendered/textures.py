@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.features import pyramid
+from vslam_ref.features.levels import pyramid
 
 Bytes = NDArray[np.uint8]
 LEVELS = 7
