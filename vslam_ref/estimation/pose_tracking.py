@@ -43,7 +43,8 @@ class TrackedPose(NamedTuple):
     sigma : float
         Scale of the errors in one coordinate, in units of ``sigma_px``.
     cov_pose : ndarray, shape (6, 6)
-        Of the left perturbation (rho, phi), to first order.
+        Of the left perturbation (rho, phi), to first order.  With Tukey's loss a tenth too large: a
+        measurement counts by its weight, 0.86 in the mean, and is worth its efficiency, 0.95.
     reason : str
         Empty, or why there is no pose.
     """
