@@ -116,9 +116,10 @@ def track_pose(
     X, u, T = as_array("X_world", X_world, 3), as_array("uv", uv, 2), as_array("T_start", T_start, 4, 4)
     if X.ndim != 2 or u.shape != (len(X), 2):
         raise ValueError(f"X_world {X.shape} and uv {u.shape}: need (N, 3) and (N, 2)")
-    root = 1.0 / np.broadcast_to(np.asarray(sigma_px, np.float64), (len(X),))
-    if not (np.isfinite(root) & (root > 0)).all():
+    sigma = np.broadcast_to(np.asarray(sigma_px, np.float64), (len(X),))
+    if not (np.isfinite(sigma) & (sigma > 0)).all():
         raise ValueError("sigma_px must be finite and more than 0")
+    root = 1.0 / sigma
     rho = tuned("tukey", 2) if loss is None else loss
     if isinstance(camera, Pinhole) and isinstance(rho, Tukey) and np.isfinite(rho.c):
         T, w, H, last = _pinhole_steps(camera.params, T, X, u, root, rho.c, steps, least_sigma)

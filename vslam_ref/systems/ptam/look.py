@@ -15,7 +15,7 @@ from vslam_ref.systems.visual_map import PreparedPicture
 
 
 def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> PreparedPicture:
-    """Make a picture (H, W) of 8 bits ready to be looked at."""
+    """Make a picture (H, W), grey levels of 8 bits, ready; its corners are in pixels of their level."""
     levels = pyramid(grey, settings.levels)
     limit = [settings.threshold_finest] + [settings.threshold] * (settings.levels - 1)
     corners = tuple(detect(image, t, settings.arc) for image, t in zip(levels, limit, strict=True))
@@ -31,7 +31,7 @@ def peaks(picture: PreparedPicture, level: int, settings: FeatureSettings) -> Pi
 
 
 def strong_corners(picture: PreparedPicture, level: int, settings: FeatureSettings) -> IntArray:
-    """Numbers of a level's corners that are peaks and strong, strongest first."""
+    """Indices (n,) of a level's corners that are peaks and strong, strongest first; pixels of the level."""
     image, corners = picture.levels[level], picture.corners[level]
     peak = is_peak(corners, corner_score(image, corners.xy, settings.arc))
     height, width = image.shape

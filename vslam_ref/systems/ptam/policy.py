@@ -44,7 +44,7 @@ class KeyframePolicy:
 
 
 def distance(visual_map: VisualMap, tracked: Tracked) -> float:
-    """Ratio of the distance to the nearest keyframe and the median depth of the points that were seen."""
+    """Ratio of the distance to the nearest keyframe and the median depth of what was seen; no unit."""
     seen = tracked.fine.seen
     depth = float(np.median(seen.depth[tracked.fine.weights > 0]))
     centres = camera_pose.centre_from_pose(visual_map.T_kf_world)

@@ -77,7 +77,7 @@ def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Gen
 
 
 class Pair(NamedTuple):
-    """Matches of two pictures: pixels of level 0 (n, 2), levels (n,), numbers of the trails (n,)."""
+    """Matches: ``uv_a (n, 2)``, ``uv_b (n, 2)`` in pixels of level 0, ``level (n,)``, trail ``row (n,)``."""
 
     uv_a: Array
     uv_b: Array

@@ -25,8 +25,8 @@ class Trails:
     pictures : list of PreparedPicture
         From the first to the newest.
     level : ndarray of int64, shape (n,)
-    first, now : ndarray, shape (n, 2)
-        Pixels of level 0.
+    first, now, speed : ndarray, shape (n, 2)
+        Pixels of level 0; the speed in pixels a picture.
     """
 
     pictures: list[PreparedPicture]
@@ -74,7 +74,7 @@ def go_on(trails: Trails, picture: PreparedPicture, s: StartSettings) -> Trails:
 
 
 def from_the_first(trails: Trails, s: StartSettings) -> Array:
-    """Where the first picture's own patches lie now (n, 2); NaN where they are not found any more.
+    """Where the first picture's own patches lie now (n, 2), pixels; NaN where they are not found any more.
 
     Followed from picture to picture, a patch drifts off by a little each time.
     """
