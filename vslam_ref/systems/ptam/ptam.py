@@ -32,7 +32,7 @@ from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 
 
 class Pose(NamedTuple):
-    """Pose relative to a keyframe, ``T_cam_kf (4, 4)``, and ``live (4, 4)`` as told then; the map's unit."""
+    """Pose relative to a keyframe, ``T_cam_kf (4, 4)``, and ``live (4, 4)`` as told then; own unit."""
 
     number: int
     kf: int

@@ -9,7 +9,7 @@ from vslam_ref.support.config import assume
 
 @dataclass(frozen=True)
 class FeatureSettings:
-    """Corners and patches; every field has its unit beside it."""
+    """Corners and patches; every field has its own unit, beside it."""
 
     levels: int = assume(4, "", "PTAM's pyramid: 640 x 480 to 80 x 60")
     arc: int = assume(10, "pixels of 16", "PTAM's FAST-10")
@@ -28,7 +28,7 @@ class FeatureSettings:
 
 @dataclass(frozen=True)
 class StartSettings:
-    """From two pictures to a map; every field has its unit beside it."""
+    """From two pictures to a map; every field has its own unit, beside it."""
 
     trails: int = assume(800, "points", "PTAM starts with 1000 corners")
     least_trails: int = assume(80, "points", "fewer: the trails begin anew")
@@ -54,7 +54,7 @@ class StartSettings:
 
 @dataclass(frozen=True)
 class TrackerSettings:
-    """Two passes, quality, and what is done when lost; every field has its unit beside it."""
+    """Two passes, quality, and what is done when lost; every field has its own unit, beside it."""
 
     coarse_points: int = assume(60, "points", "PTAM's 50 to 60, of the two coarsest levels")
     coarse_least: int = assume(15, "points", "fewer found: the next guess is tried")
@@ -78,7 +78,7 @@ class TrackerSettings:
 
 @dataclass(frozen=True)
 class KeyframeSettings:
-    """When a picture becomes a keyframe; every field has its unit beside it."""
+    """When a picture becomes a keyframe; every field has its own unit, beside it."""
 
     least_inliers: int = assume(50, "points", "trap: a starved map must be fed")
     worst_sigma: float = assume(1.5, "px of the level", "a pose that is not good enough spoils the map")
@@ -93,7 +93,7 @@ class KeyframeSettings:
 
 @dataclass(frozen=True)
 class MapperSettings:
-    """What happens to a keyframe; every field has its unit beside it."""
+    """What happens to a keyframe; every field has its own unit, beside it."""
 
     look_radius: float = assume(4.0, "px", "looking again with a known pose")
     epipolar: float = assume(2.0, "px of the level", "corners so near to the curve are compared")
