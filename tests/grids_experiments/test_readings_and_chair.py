@@ -9,7 +9,7 @@ from vslam_ref.experiments.framework import Study, load
 from vslam_ref.experiments.framework.statistics import null_rate
 from vslam_ref.experiments.grids import moved_chair as chair
 from vslam_ref.experiments.grids import readings
-from vslam_ref.experiments.grids.counting import Counts
+from vslam_ref.experiments.grids.counting import CellCounts
 from vslam_ref.support.config import without_reason
 from vslam_ref.support.errors import InputError
 
@@ -21,7 +21,7 @@ def judge(module: object, study: object) -> dict[str, str]:
 # -- readings --------------------------------------------------------------------------------------
 
 
-def reading_study(precision: list[float], recall: list[float], spread: float = 0.0) -> Study[Counts]:
+def reading_study(precision: list[float], recall: list[float], spread: float = 0.0) -> Study[CellCounts]:
     """Six runs whose D has these precisions and recalls, plus or minus a hundredth."""
     rng = np.random.default_rng(0)
     moving = np.zeros((6, 4, 4))
@@ -30,7 +30,7 @@ def reading_study(precision: list[float], recall: list[float], spread: float = 0
         moving[:, i] = np.stack([1e4 * (p + shift), np.full(6, 1e4), np.full(6, 1e4), 1e4 * (r + shift)], 1)
     static = np.tile(np.array([90.0, 100.0, 100.0, 95.0]), (6, 4, 1))
     static[3, 2, 1] += spread
-    return Study(readings.ReadingsConfig(), Counts(static, moving, np.zeros(6)))
+    return Study(readings.ReadingsConfig(), CellCounts(static, moving, np.zeros(6)))
 
 
 def test_readings_as_measured_and_as_a_says() -> None:
@@ -65,7 +65,7 @@ def test_a_reading_that_is_no_better_is_not_called_better() -> None:
         rng = np.random.default_rng(seed)
         moving = np.tile(np.array([800.0, 1000.0, 1000.0, 700.0]), (6, 4, 1))
         moving[..., [0, 3]] += rng.normal(0, 30, (6, 4, 2))
-        study = Study(readings.ReadingsConfig(), Counts(np.zeros((6, 4, 4)), moving, np.zeros(6)))
+        study = Study(readings.ReadingsConfig(), CellCounts(np.zeros((6, 4, 4)), moving, np.zeros(6)))
         said += judge(readings, study)["d-needs-no-memory"] == "reproduced"
     # the rate that the claim declares, plus and minus three sigma of 200 draws
     rate = null_rate(6)

@@ -33,7 +33,7 @@ def test_every_setting_has_a_reason(id: str) -> None:
 
 def separated(
     S: tuple[float, float], plain: tuple[float, float], D: tuple[float, float]
-) -> Study[counting.Counts]:
+) -> Study[counting.CellCounts]:
     """A study with these precisions and recalls at 20 %, give or take a thousandth between runs."""
     config = counting.SeparationConfig(runs=6, densities=(0.0, 0.2))
     wobble = np.random.default_rng(1).uniform(-1, 1, (2, 6, 1))
@@ -44,7 +44,7 @@ def separated(
         return np.concatenate([1000 * p, 1000 * ones, 1000 * ones, 1000 * r], axis=-1)
 
     static = np.stack([count(*S), count(*plain)], axis=2)
-    return Study(config, counting.Counts(static, count(*D), np.zeros((2, 6))))
+    return Study(config, counting.CellCounts(static, count(*D), np.zeros((2, 6))))
 
 
 def test_the_aims_of_the_separation() -> None:

@@ -12,7 +12,7 @@ from vslam_ref.features import finest_from_level
 from vslam_ref.systems.ptam.look import prepare, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
-from vslam_ref.worlds.rendered import Scene, scene
+from vslam_ref.worlds.rendered import RenderedScene, scene
 
 SIZE = (160, 120)
 FEATURES = FeatureSettings(least_eigenvalue=40.0)
@@ -21,7 +21,7 @@ FEATURES = FeatureSettings(least_eigenvalue=40.0)
 class Desk(NamedTuple):
     """The scene, a map with pictures 0 and 6 as keyframes, and three pictures made ready: 0, 6 and 9."""
 
-    scene: Scene
+    scene: RenderedScene
     map: VisualMap
     pictures: dict[int, PreparedPicture]
 

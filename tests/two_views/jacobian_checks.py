@@ -8,7 +8,7 @@ import numpy as np
 
 from vslam_ref.geometry import se3, so3
 
-ROOM = "vslam_ref.geometry.multiview.two_views.sampson."
+ROOM = "vslam_ref.geometry.multiview.two_views.sampson_distance."
 
 
 class Motion:

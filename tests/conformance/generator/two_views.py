@@ -11,7 +11,7 @@ from mpmath import mpf
 from generator.building import Topic, tolerance
 from generator.exact import column, expm, floats, hat, matrix, vector
 from generator.two_views_costs import answers, cost_groups
-from generator.world import digits
+from generator.draws import digits
 
 TOPIC, CHAPTER = "two_views", 9
 

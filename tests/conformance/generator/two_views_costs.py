@@ -10,7 +10,7 @@ from mpmath import mpf
 
 from generator.building import Topic, tolerance
 from generator.exact import derivative, expm, floats, hat, matrix, vector
-from generator.world import digits
+from generator.draws import digits
 from vslam_ref.arrays import Array
 
 
