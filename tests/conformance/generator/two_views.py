@@ -9,9 +9,9 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
+from generator.draws import digits
 from generator.exact import column, expm, floats, hat, matrix, vector
 from generator.two_views_costs import answers, cost_groups
-from generator.draws import digits
 
 TOPIC, CHAPTER = "two_views", 9
 

@@ -9,8 +9,8 @@ import numpy as np
 from mpmath import mpf
 
 from generator.building import Topic, tolerance
-from generator.exact import derivative, expm, floats, hat, matrix, vector
 from generator.draws import digits
+from generator.exact import derivative, expm, floats, hat, matrix, vector
 from vslam_ref.arrays import Array
 
 
