@@ -43,9 +43,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of tracking."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     rule = tolerance(
         1e-8, "5.1230 for 5.122986 moves a weight by 1e-6 and a step of 1e-3 by 1e-9", float32=1e-4
     )

@@ -66,9 +66,7 @@ NOTES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """All groups of two views."""
-    topic = Topic(CHAPTER, TOPIC)
-    for identity, (meaning, formula) in NOTES.items():
-        topic.note(identity, meaning, formula)
+    topic = Topic(CHAPTER, TOPIC, NOTES)
     _matrices(topic, rng)
     _motions(topic, rng)
     cost_groups(topic, rng)
