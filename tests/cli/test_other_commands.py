@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 import types
 
@@ -142,6 +143,17 @@ def test_warming_compiles_the_kernels_where_numba_is_in_use(monkeypatch, tmp_pat
     assert warmed == [1]
     assert "kernels ready after" in capsys.readouterr().out
     assert json.loads(target.read_text())["backend"] == "numba"
+
+
+def test_the_modules_that_are_warmed_declare_every_twin_by_themselves():
+    """In a process of its own: here, other tests have imported everything."""
+    code = (
+        "import importlib; from vslam_ref import _kernels; from vslam_ref.commands import warm_cache\n"
+        "for name in warm_cache.WITH_TWINS: importlib.import_module(name)\n"
+        "print(*sorted(twin for _, twin in _kernels.REGISTRY.values()))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == sorted(_digests.stored()["pairs"])
 
 
 def test_warming_declares_every_twin_and_counts_those_set_aside_apart(monkeypatch, tmp_path, capsys):

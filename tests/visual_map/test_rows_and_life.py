@@ -97,7 +97,7 @@ def test_shared_points_and_neighbours_by_counting(make_map: MakeMap) -> None:
     visual_map = make_map(keyframes=7)
     visual_map.take_back(np.random.default_rng(1).random(len(visual_map.sightings)) < 0.2)
     sets = [set(visual_map.measured_in(k).tolist()) for k in range(7)]
-    shared = shared_points(visual_map)
+    shared = np.stack([shared_points(visual_map, kf) for kf in range(7)])
     assert shared.tolist() == [[len(a & b) for b in sets] for a in sets]
     for kf in range(7):
         near = neighbours(visual_map, kf, 3)

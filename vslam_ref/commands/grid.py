@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, json_target, print_backend, warm, write_json
+from vslam_ref.commands.options import add_json, json_target, print_backend, progress_bar, warm, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from vslam_ref.datasets.carmen import CarmenLog
     from vslam_ref.experiments.grid_log.mapping import GridConfig, Mapped
 
@@ -108,17 +104,12 @@ def draw(log: CarmenLog, config: GridConfig, folder: Path, video_size: str) -> M
     from vslam_ref.experiments.grid_log.mapping import map_log
     from vslam_ref.experiments.grid_log.report import FILM
 
-    with progress_bar(len(log.times)) as progress:
+    with progress_bar(len(log.times), "scan") as bar:
+
+        def progress(done: int) -> None:
+            bar.update(done - bar.n)
+
         if not config.video_frames or video_size == "none":
             return map_log(log, config, None, progress)
         with video.webm(folder / FILM, video_size) as film:
             return map_log(log, config, Director(film, len(log.times), config.video_frames), progress)
-
-
-@contextmanager
-def progress_bar(total: int) -> Iterator[Callable[[int], None]]:
-    """Show progress on a terminal; be silent elsewhere."""
-    from tqdm import tqdm
-
-    with tqdm(total=total, unit="scan", disable=None, leave=False) as bar:
-        yield lambda done: bar.update(done - bar.n)

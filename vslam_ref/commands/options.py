@@ -6,9 +6,13 @@ import argparse
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 PATIENCE = 3.0
 """Seconds of silence before it is said that kernels are being compiled."""
@@ -115,6 +119,15 @@ def warm(*modules: str) -> str:
     if seconds > PATIENCE:
         print(f"kernels ready after {seconds:.0f} s", file=sys.stderr, flush=True)
     return backend
+
+
+@contextmanager
+def progress_bar(total: int, unit: str, what: str | None = None) -> Iterator[tqdm[Any]]:
+    """Show progress and its rate on a terminal; be silent elsewhere."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=what, unit=unit, disable=None, leave=False) as bar:
+        yield bar
 
 
 def print_backend() -> None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vslam_ref.commands.options import (
     add_json,
@@ -16,6 +14,7 @@ from vslam_ref.commands.options import (
     folder_target,
     json_target,
     print_backend,
+    progress_bar,
     warm,
     write_json,
 )
@@ -129,8 +128,8 @@ def follow(sequence: Sequence, settings: Settings, interrupted: Interrupts) -> R
     """Run with a progress bar; Ctrl-C ends it after the picture."""
     from vslam_ref.experiments.ptam import running
 
-    with progress_bar(len(sequence), "tracking") as progress:
-        done = running.run(sequence, settings, lambda: interrupted.asked, progress)
+    with progress_bar(len(sequence), "picture", "tracking") as bar:
+        done = running.run(sequence, settings, lambda: interrupted.asked, bar.update)
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     return done
@@ -142,15 +141,6 @@ def draw(target: Path, done: Run, size: str, interrupted: Interrupts) -> None:
 
     if size == "none":
         return
-    with progress_bar(len(done.frames), "film") as progress:
-        done.filmed = overlay.film(target, done, size, lambda: interrupted.asked, progress)
+    with progress_bar(len(done.frames), "picture", "film") as bar:
+        done.filmed = overlay.film(target, done, size, lambda: interrupted.asked, bar.update)
     done.interrupted |= interrupted.asked
-
-
-@contextmanager
-def progress_bar(total: int, what: str) -> Iterator[Callable[[], Any]]:
-    """Show progress and pictures a second on a terminal; be silent elsewhere."""
-    from tqdm import tqdm
-
-    with tqdm(total=total, desc=what, unit="picture", disable=None, leave=False) as bar:
-        yield bar.update

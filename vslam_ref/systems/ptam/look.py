@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import corner_score, detect, is_peak, pyramid, shi_tomasi, small_image
 from vslam_ref.features.corners import HALF
 from vslam_ref.features.fast import Pixels
@@ -25,15 +25,18 @@ def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Prepared
 
 def peaks(picture: PreparedPicture, level: int, settings: FeatureSettings) -> Pixels:
     """Pixels (n, 2) of a level's corners that are stronger than their neighbours."""
+    return picture.corners[level].xy[_stand_out(picture, level, settings)]
+
+
+def _stand_out(picture: PreparedPicture, level: int, settings: FeatureSettings) -> BoolArray:
     corners = picture.corners[level]
-    score = corner_score(picture.levels[level], corners.xy, settings.arc)
-    return corners.xy[is_peak(corners, score)]
+    return is_peak(corners, corner_score(picture.levels[level], corners.xy, settings.arc))
 
 
 def strong_corners(picture: PreparedPicture, level: int, settings: FeatureSettings) -> IntArray:
     """Indices (n,) of a level's corners that are peaks and strong, strongest first; pixels of the level."""
     image, corners = picture.levels[level], picture.corners[level]
-    peak = is_peak(corners, corner_score(image, corners.xy, settings.arc))
+    peak = _stand_out(picture, level, settings)
     height, width = image.shape
     reach = HALF + 2
     inner = (corners.xy >= reach).all(1) & (corners.xy < (width - reach, height - reach)).all(1)

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.geometry import se3
+from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.ptam import trails as trail_steps
 from vslam_ref.systems.ptam.look import prepare
-from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, Measurements, adjust_all, map_keyframe
+from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
 from vslam_ref.systems.ptam.policy import KeyframePolicy
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
@@ -179,19 +179,16 @@ class Ptam:
         """Remember a pose relative to the keyframe nearest to it."""
         assert self.map is not None
         T = tracked.T_cam_world
-        centre = se3.translation(se3.inverse(T))
-        away = np.linalg.norm(se3.translation(se3.inverse(self.map.T_kf_world)) - centre, axis=1)
-        kf = int(np.argmin(away))
+        centres = camera_pose.centre_from_pose(self.map.T_kf_world)
+        kf = int(np.argmin(np.linalg.norm(centres - camera_pose.centre_from_pose(T), axis=1)))
         T_cam_kf = se3.compose(T, se3.inverse(self.map.T_kf_world[kf]))
         self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
 
     def _keyframe(self, picture: PreparedPicture, tracked: Tracked) -> MappedKeyframe:
         assert self.map is not None
         assert self.tracker is not None
-        held = tracked.fine.weights > 0
-        seen = tracked.fine.seen
-        measured = Measurements(seen.point[held], tracked.fine.uv[held], seen.level[held])
-        mapped = map_keyframe(self.map, picture, tracked.T_cam_world, measured, self.settings)
+        assert self.tracker.known is not None  # it has just tracked this picture
+        mapped = map_keyframe(self.map, picture, tracked.T_cam_world, self.tracker.known, self.settings)
         T = self.map.T_kf_world[mapped.kf].copy()
         live = self.poses[picture.number].live
         self.poses[picture.number] = Pose(picture.number, mapped.kf, np.eye(4), live)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from vslam_ref.support.config import assume
+from vslam_ref.systems.visual_map import Looks
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,11 @@ class FeatureSettings:
     measure: str = assume("zmssd", "", "PTAM's; zncc is the other")
     first_refine: bool = assume(True, "", "points lie beside corners: corners alone find fewer")
 
+    @property
+    def looks(self) -> Looks:
+        """How patches are compared."""
+        return Looks(self.limit, self.measure, self.absolute, self.first_refine)
+
 
 @dataclass(frozen=True)
 class StartSettings:
@@ -44,8 +50,6 @@ class StartSettings:
     depth_spread: float = assume(
         1.25, "ratio of the 90 % to the 10 % depth", "one depth is a plane: nothing is known"
     )
-    rival: float = assume(1.5, "ratio of costs", "another answer that is nearly as good: refused")
-    rival_offset: float = assume(0.01, "px^2 per point", "added, since costs near zero have no ratio")
     keep: float = assume(
         0.6, "share", "of the trails that must survive following from the first picture again"
     )

@@ -66,7 +66,7 @@ class Attempt(NamedTuple):
 
 def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Generator) -> Attempt | str:
     """Try to start from the first and the last picture of trails; a sentence if there is nothing to try."""
-    again = from_the_first(trails, s)
+    again = from_the_first(trails)
     ok = np.isfinite(again[:, 0])
     if ok.sum() < max(s.least_trails, 8):
         return f"{ok.sum()} of {len(ok)} corners are still found: need {s.least_trails}"

@@ -73,7 +73,7 @@ def go_on(trails: Trails, picture: PreparedPicture, s: StartSettings) -> Trails:
     return kept
 
 
-def from_the_first(trails: Trails, s: StartSettings) -> Array:
+def from_the_first(trails: Trails) -> Array:
     """Where the first picture's own patches lie now (n, 2), pixels; NaN where they are not found any more.
 
     Followed from picture to picture, a patch drifts off by a little each time.

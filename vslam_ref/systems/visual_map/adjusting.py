@@ -20,7 +20,7 @@ from vslam_ref.estimation.bundle import (
 )
 from vslam_ref.estimation.bundle.local import local_problem
 from vslam_ref.features import level_sigma
-from vslam_ref.systems.visual_map.visual_map import VisualMap
+from vslam_ref.systems.visual_map.visual_map import VisualMap, neighbours
 
 
 class Adjusted(NamedTuple):
@@ -113,7 +113,5 @@ def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,)) -> _Whole:
 
 def local_active(visual_map: VisualMap, newest: int, count: int) -> IntArray:
     """Return the newest keyframe and its ``count`` best connected ones, without keyframe 0, which stays."""
-    from vslam_ref.systems.visual_map.visual_map import neighbours
-
     chosen = np.concatenate([[newest], neighbours(visual_map, newest, count)])
     return np.asarray(chosen[chosen != 0], dtype=np.int64)

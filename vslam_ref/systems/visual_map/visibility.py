@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 from vslam_ref.features import Templates, level_from_finest, level_sigma, sampling, search_level, warp
-from vslam_ref.features.templates import AFTER, BEFORE
+from vslam_ref.features.templates import AFTER, BEFORE, SIDE
 from vslam_ref.geometry import se3
 from vslam_ref.systems.visual_map.visual_map import Rowlike, VisualMap
 
@@ -139,7 +139,7 @@ def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray)
     """
     at = level_from_finest(origin.uv, origin.level)
     M = sampling(A, level, origin.level)
-    patch = np.zeros((len(at), BEFORE + AFTER + 1, BEFORE + AFTER + 1), np.uint8)
+    patch = np.zeros((len(at), SIDE, SIDE), np.uint8)
     inside = np.zeros(len(at), np.bool_)
     for each in range(visual_map.levels):
         rows = np.flatnonzero(origin.level == each)
@@ -147,9 +147,8 @@ def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray)
             continue
         images = visual_map.image(each)
         height, width = images.shape[1:]
-        above = np.stack(
-            [np.zeros(len(rows)), origin.kf[rows] * float(height)], 1
-        )  # images lie in one column
+        # images lie in one column
+        above = np.stack([np.zeros(len(rows)), origin.kf[rows] * float(height)], 1)
         found = warp(images.reshape(-1, width), at[rows] + above, M[rows])
         patch[rows], inside[rows] = found.patch, found.inside & _whole(at[rows], M[rows], height)
     return Templates(patch, inside)

@@ -243,19 +243,18 @@ def slopes(camera: Camera, uv: ArrayLike) -> Array:
     return np.asarray((ray.J_pixel[..., :2, :] - xn * ray.J_pixel[..., 2:, :]) / z)
 
 
-def shared_points(visual_map: VisualMap) -> IntArray:
-    """How many points each two keyframes both see, (K, K); on the diagonal, how many each sees."""
+def shared_points(visual_map: VisualMap, kf: int) -> IntArray:
+    """How many points each keyframe (K,) has in common with ``kf``; at ``kf``, how many that sees."""
     seen = visual_map.sightings
-    on = seen["on"]
-    table = np.zeros((len(visual_map.keyframes), len(visual_map.points)), np.float32)
-    table[seen["kf"][on], seen["point"][on]] = 1.0
-    counts: IntArray = np.rint(table @ table.T).astype(np.int64)
-    return counts
+    in_kf = np.zeros(len(visual_map.points), np.bool_)
+    in_kf[visual_map.measured_in(kf)] = True
+    common = seen["on"] & in_kf[seen["point"]]
+    return np.bincount(seen["kf"][common], minlength=len(visual_map.keyframes))
 
 
 def neighbours(visual_map: VisualMap, kf: int, count: int) -> IntArray:
     """Keyframes (at most ``count``) that share most points with ``kf``, most first; without ``kf`` itself."""
-    shared = shared_points(visual_map)[kf].copy()
+    shared = shared_points(visual_map, kf)
     shared[kf] = 0
     order = np.argsort(-shared, kind="stable")[:count]
     return np.asarray(order[shared[order] > 0])

@@ -6,29 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle import Options, Robust
 from vslam_ref.estimation.robust import tuned
 from vslam_ref.systems.ptam.mapper.associate import look_again, look_in_neighbours, seldom_found
 from vslam_ref.systems.ptam.mapper.new_points import new_points
 from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.ptam.tracker.recover import Known
 from vslam_ref.systems.visual_map import (
     Adjusted,
-    Looks,
     PreparedPicture,
     VisualMap,
     adjust,
     local_active,
     neighbours,
 )
-
-
-class Measurements(NamedTuple):
-    """What the tracker found in a picture: points (n,), pixels of level 0 (n, 2), levels (n,)."""
-
-    point: IntArray
-    uv: Array
-    level: IntArray
 
 
 class MappedKeyframe(NamedTuple):
@@ -58,7 +50,7 @@ def map_keyframe(
     visual_map: VisualMap,
     picture: PreparedPicture,
     T_cam_world: Array,
-    seen: Measurements,
+    seen: Known,
     settings: Settings,
 ) -> MappedKeyframe:
     """Take a picture with its pose ``T_cam_world (4, 4)`` into the map, and make the map better by it.
@@ -66,15 +58,14 @@ def map_keyframe(
     Lengths have the map's own unit.  Implements A§2.2.2.1.
     """
     s, f = settings.mapper, settings.features
-    looks = Looks(f.limit, f.measure, f.absolute, f.first_refine)
     kf = visual_map.add_keyframe(T_cam_world, picture)
     held = visual_map.alive[seen.point]
     visual_map.observe(kf, seen.point[held], seen.level[held], seen.uv[held])
     alive = np.flatnonzero(visual_map.alive)
-    again = look_again(visual_map, kf, picture, alive, s.look_radius, looks)
+    again = look_again(visual_map, kf, picture, alive, s.look_radius, f.looks)
     fresh = new_points(visual_map, kf, picture, s, f)
     around = neighbours(visual_map, kf, s.neighbours)
-    elsewhere = look_in_neighbours(visual_map, around, fresh, s.look_radius, looks)
+    elsewhere = look_in_neighbours(visual_map, around, fresh, s.look_radius, f.looks)
     adjusted = [adjust_local(visual_map, kf, settings)]
     if kf % s.global_every == 0:
         adjusted.append(adjust_all(visual_map, settings, s.global_steps))

@@ -18,7 +18,7 @@ from vslam_ref.systems.ptam.look import peaks, spread, strong_corners
 from vslam_ref.systems.ptam.mapper.curve_search import CornerRays, Gates, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
 from vslam_ref.systems.ptam.tracker.recover import picture_of
-from vslam_ref.systems.visual_map import Looks, PreparedPicture, VisualMap, shared_points
+from vslam_ref.systems.visual_map import PreparedPicture, VisualMap, shared_points
 from vslam_ref.systems.visual_map.measure import locate
 from vslam_ref.systems.visual_map.visual_map import Bytes
 
@@ -103,7 +103,7 @@ def _side(visual_map: VisualMap, kf: int, picture: PreparedPicture, level: int, 
 
 def partners(visual_map: VisualMap, kf: int, count: int) -> IntArray:
     """Keyframes with which to triangulate: of those that share most points, the nearest with a base line."""
-    shared = shared_points(visual_map)[kf].copy()
+    shared = shared_points(visual_map, kf)
     shared[kf] = 0
     enough = np.flatnonzero(shared >= 0.3 * max(shared.max(), 1))
     centres = camera_pose.centre_from_pose(visual_map.T_kf_world)
@@ -160,7 +160,7 @@ def match(
     rows = np.flatnonzero(there.corner >= 0)
     start = b.peaks.xy[there.corner[rows]].astype(np.float64)
     whole = Templates(patch[rows], np.ones(len(rows), np.bool_))
-    looks = Looks(f.limit, f.measure, f.absolute, True)
+    looks = f.looks._replace(first_refine=True)
     end = locate(b.image, b.corners, whole, start, np.full(len(rows), 2.0), looks)
     rows, uv = rows[end.ok], end.uv[end.ok]
     if s.search_back and len(rows):

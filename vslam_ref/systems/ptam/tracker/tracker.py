@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker import recover
 from vslam_ref.systems.ptam.tracker.coarse_fine import Pass, coarse, fine
 from vslam_ref.systems.ptam.tracker.quality import Quality, quality
-from vslam_ref.systems.visual_map import Looks, PreparedPicture, VisualMap
+from vslam_ref.systems.visual_map import PreparedPicture, Visible, VisualMap
 
 
 class Tracked(NamedTuple):
@@ -56,12 +57,6 @@ class Tracker:
     known: recover.Known | None = None
     lost: int = 0
 
-    @property
-    def looks(self) -> Looks:
-        """How patches are compared."""
-        f = self.settings.features
-        return Looks(f.limit, f.measure, f.absolute, f.first_refine)
-
     def track(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked:
         """Find the pose of the next picture; the map is only read.
 
@@ -76,8 +71,6 @@ class Tracker:
         return found
 
     def _nothing(self) -> Tracked:
-        from vslam_ref.systems.visual_map import Visible
-
         none = Visible(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 2, 2)), np.zeros(0, int))
         pose = TrackedPose(self.T_last, np.zeros(0), np.inf, np.diag(np.full(6, np.inf)), "no pose was found")
         nowhere = Pass(none, np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0), pose)
@@ -88,7 +81,7 @@ class Tracker:
         s = self.settings.tracker
         best: tuple[int, Array, str] | None = None
         for way, T_guess, radius in self._guesses(visual_map, picture):
-            first = coarse(visual_map, picture, T_guess, radius, s, self.looks, self.rng)
+            first = coarse(visual_map, picture, T_guess, radius, s, self.settings.features.looks, self.rng)
             if best is None or first.inliers > best[0]:
                 best = first.inliers, first.pose.T_cam_world, way
             agree = first.inliers / max(len(first.seen.point), 1)
@@ -102,10 +95,10 @@ class Tracker:
         self, visual_map: VisualMap, picture: PreparedPicture, T: Array, radius: float, way: str
     ) -> Tracked:
         s = self.settings.tracker
-        second = fine(visual_map, picture, T, radius, s, self.looks, self.rng)
+        second = fine(visual_map, picture, T, radius, s, self.settings.features.looks, self.rng)
         return Tracked(second.pose.T_cam_world, quality(second, s), second, way)
 
-    def _guesses(self, visual_map: VisualMap, picture: PreparedPicture):  # type: ignore[no-untyped-def]
+    def _guesses(self, visual_map: VisualMap, picture: PreparedPicture) -> Iterator[tuple[str, Array, float]]:
         """Guesses of the pose, each with the radius in which to look."""
         radius = self.settings.tracker.radius
         yield "velocity", self.motion.predict(self.T_last), radius[0]
