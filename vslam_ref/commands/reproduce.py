@@ -28,6 +28,7 @@ examples:
 
 '--set' takes the keys of "config" in result.json. Options apply in the order --quick, --runs, --seed, --set.
 An interrupted command goes on where it stopped when it is given again.
+An experiment on recorded data that are not found is "not run" with --all, and an error if it is asked for.
 'runs.npz' holds per-run arrays; "arrays" in result.json says what each of them is.
 Exit status: 0 done, whatever the verdicts say; with --strict 1 if a claim is not reproduced; 2 bad input."""
 
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.experiments.framework import reproduce as framework
     from vslam_ref.support import files
 
-    work = _work(options)
+    work, not_run = _work(options)
     context = _context(options)
     target = json_target(options)
     out = files.require_folder(options.out)
@@ -79,14 +80,18 @@ def run(options: argparse.Namespace) -> int:
     for outcome in framework.reproduce(work, context, out, options.quick, begin):
         _print_outcome(outcome)
         outcomes.append(outcome)
+    for id, names in not_run.items():
+        print(f"not run         {id}: {_where(names)}", flush=True)
     verdicts = [claim.verdict for outcome in outcomes for claim in outcome.claims]
-    _print_summary(verdicts, out)
-    write_json(target, _numbers(outcomes, out))
+    _print_summary(verdicts, len(not_run), out)
+    write_json(target, _numbers(outcomes, not_run, out))
     return 1 if options.strict and FAILED in verdicts else 0
 
 
-def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
-    """Return each experiment with its config; ``InputError`` before anything has run."""
+def _work(
+    options: argparse.Namespace,
+) -> tuple[list[tuple[Experiment[Any], Any]], dict[str, Sequence[str]]]:
+    """Each experiment with its config, and those that lack data; ``InputError`` before anything has run."""
     from vslam_ref.experiments.registry import load, summaries
     from vslam_ref.support.errors import InputError
 
@@ -96,7 +101,19 @@ def _work(options: argparse.Namespace) -> list[tuple[Experiment[Any], Any]]:
         )
     ids = [s.id for s in summaries()] if options.all else list(dict.fromkeys(options.ids))
     experiments = [load(id) for id in ids]
-    return [(experiment, _configure(experiment, options)) for experiment in experiments]
+    work = [(experiment, _configure(experiment, options)) for experiment in experiments]
+    missing = {experiment.id: names for experiment, config in work if (names := experiment.missing(config))}
+    if missing and not options.all:
+        raise InputError("; ".join(f"{id}: {_where(names)}" for id, names in missing.items()))
+    return [each for each in work if each[0].id not in missing], missing
+
+
+def _where(names: Sequence[str]) -> str:
+    """Say which data are missing."""
+    from vslam_ref.datasets.catalogue import VARIABLE
+
+    sets = f"data set{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    return f"needs the {sets}, not found in {VARIABLE}; 'vslam-ref data' says where to get it"
 
 
 def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:
@@ -152,17 +169,19 @@ def _claim_lines(experiment: str, claim: Claim) -> list[str]:
     return lines
 
 
-def _print_summary(verdicts: Sequence[str], out: Path) -> None:
+def _print_summary(verdicts: Sequence[str], not_run: int, out: Path) -> None:
     from vslam_ref.experiments.framework.claims import VERDICTS
 
     counts = ", ".join(f"{verdicts.count(v)} {v}" for v in VERDICTS)
-    print(f"{len(verdicts)} claims: {counts}; open {out / 'index.html'}", flush=True)
+    rest = f"; {not_run} experiments not run" if not_run else ""
+    print(f"{len(verdicts)} claims: {counts}{rest}; open {out / 'index.html'}", flush=True)
 
 
-def _numbers(outcomes: Sequence[Reproduced], out: Path) -> dict[str, Any]:
+def _numbers(outcomes: Sequence[Reproduced], not_run: dict[str, Sequence[str]], out: Path) -> dict[str, Any]:
     """Return what was printed, as ``--json`` writes it."""
     return {
         "out": str(out),
+        "not_run": [{"experiment": id, "missing": list(names)} for id, names in not_run.items()],
         "experiments": [
             {
                 "experiment": o.experiment.id,

@@ -129,7 +129,7 @@ def follow(sequence: Sequence, settings: Settings, interrupted: Interrupts) -> R
     from vslam_ref.experiments.ptam import running
 
     with progress_bar(len(sequence), "picture", "tracking") as bar:
-        done = running.run(sequence, settings, lambda: interrupted.asked, bar.update)
+        done = running.run(sequence, settings, lambda _: interrupted.asked, bar.update)
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     return done

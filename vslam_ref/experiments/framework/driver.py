@@ -6,10 +6,10 @@
                                                                              |
                           Study: the same NamedTuple, its fields stacked <---+
 
-A *unit* is what one task draws from: a ``SeedSequence`` for one run, a tuple of them for a batch of runs, or
-None where nothing is drawn.  Results of single runs are stacked, those of batches joined; either way the
-runs come first.  Points with a name give a dictionary of such arrays by name; points without are stacked in
-front of the runs, unless there is only the one default point.
+A *unit* is what one task draws from: a ``SeedSequence`` for one run, a tuple of them for a batch of runs, the
+number of a recorded case, or None where nothing is drawn.  Results of single runs are stacked, those of
+batches joined; either way the runs come first.  Points with a name give a dictionary of such arrays by name;
+points without are stacked in front of the runs, unless there is only the one default point.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from vslam_ref.support.config import find_setting, settings
 
 D = TypeVar("D")
 Unit = Any
-"""None, a SeedSequence, or a tuple of them."""
+"""None, a number, a SeedSequence, or a tuple of them."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ def _fresh(unit: Unit) -> Unit:
     """Copy seeds, so that nothing depends on what was spawned from them before."""
     if isinstance(unit, tuple):
         return tuple(_fresh(seed) for seed in unit)
-    if unit is None:
-        return None
+    if unit is None or isinstance(unit, int):
+        return unit
     return np.random.SeedSequence(unit.entropy, spawn_key=unit.spawn_key)
 
 

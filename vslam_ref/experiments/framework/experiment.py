@@ -56,6 +56,11 @@ def nothing(config: Any) -> None:
     return None
 
 
+def nothing_missing(config: Any) -> Sequence[str]:
+    """Return no data set: the experiment makes its own inputs."""
+    return ()
+
+
 def _runs(study: Study[Any]) -> int | None:
     return study.runs
 
@@ -99,7 +104,7 @@ class Experiment(Generic[C]):
         ``name(point) -> str``, where points are distinguished by name and need not have equally many runs.
     seeds : callable
         ``seeds(config, point) -> sequence`` of units: one ``SeedSequence`` per run, a tuple of them per
-        batch, or None where nothing is drawn.
+        batch, the number of a recorded case, or None where nothing is drawn.
     once : callable
         ``once(config)``: what is computed beside the runs, in this process.
     sample : callable
@@ -111,6 +116,9 @@ class Experiment(Generic[C]):
         Dotted keys that differ from the defaults of ``config_type``.
     with_runs : callable
         ``with_runs(config, n) -> config`` (``--runs n``); :func:`scale_runs` unless given.
+    missing : callable
+        ``missing(config) -> sequence of str``: names of the data sets without which it cannot be run on this
+        machine; none unless given.
     """
 
     id: str
@@ -131,6 +139,7 @@ class Experiment(Generic[C]):
     arrays: Callable[[Study[Any]], Mapping[str, Any]] = fields_as_arrays
     defaults: Mapping[str, Any] = field(default_factory=dict)
     with_runs: Callable[[C, int], C] = scale_runs
+    missing: Callable[[Any], Sequence[str]] = nothing_missing
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+([-.][a-z0-9]+)*", self.id):

@@ -136,7 +136,7 @@ class Run:
 def run(
     sequence: Sequence,
     settings: Settings,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[Run], bool] = lambda done: False,
     progress: Callable[[], object] = lambda: None,
 ) -> Run:
     """Run PTAM over a sequence.
@@ -147,7 +147,7 @@ def run(
         With a camera.
     settings : Settings
     stop : callable
-        Asked before each picture; true ends the run there.
+        Asked before each picture, with the run so far; true ends it there.
     progress : callable
         Called after each picture.
 
@@ -160,7 +160,7 @@ def run(
         raise ValueError(f"{sequence.name} has no camera: need one")
     done = Run(sequence, settings, Ptam(sequence.camera, settings))
     for image in sequence:
-        if stop():
+        if stop(done):
             done.interrupted = True
             break
         done.frames.append(_one(done, image))

@@ -1,0 +1,93 @@
+"""One run of PTAM over a recorded sequence, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.experiments.ptam import numbers, running
+from vslam_ref.experiments.ptam.recorded import RecordedSequence, second_path
+
+REASON_LENGTH = 200
+
+
+class OffsetRun(NamedTuple):
+    """What became of one run; NaN where there is nothing to tell.
+
+    Attributes
+    ----------
+    offset, started : ndarray
+        First picture, and whether there was a map in time.
+    first, second : ndarray
+        The two pictures of the start; -1 without one.
+    frames, tracked, lost : ndarray
+        Pictures from the offset on, those with a pose, and those lost after the start.
+    share_all, share_after : ndarray
+        With a pose, of all pictures, and of those from the second one of the start on.
+    error, live, second_error : ndarray
+        Of the final path, of the live path, and of the final path against the other one; in the table's unit.
+    drift : ndarray
+        Scale of the last third over that of the first.
+    keyframes, points : ndarray
+    reason : ndarray of str
+        Why there was no start.
+    """
+
+    offset: IntArray
+    started: BoolArray
+    first: IntArray
+    second: IntArray
+    frames: IntArray
+    tracked: IntArray
+    lost: IntArray
+    share_all: Array
+    share_after: Array
+    error: Array
+    live: Array
+    second_error: Array
+    drift: Array
+    keyframes: IntArray
+    points: IntArray
+    reason: NDArray[np.str_]
+
+
+def told(each: RecordedSequence, offset: int, done: running.Run) -> OffsetRun:
+    """Return the numbers of a run that began with picture ``offset``."""
+    which, T = running.path(done)
+    final = numbers.accuracy(done.sequence, which, T)
+    live = numbers.accuracy(done.sequence, *running.path(done, live=True))
+    other = second_path(each)
+    second = numbers.accuracy(replace(done.sequence, truth=other), which, T) if other is not None else None
+    started = done.system.started_at
+    frames = len(done.sequence)
+    later = frames if started is None else int((done.sequence.numbers >= started[1]).sum())
+    kept = 0 if started is None else int((which >= started[1]).sum())
+    first_two = (-1, -1) if started is None else started
+    visual_map = done.system.map
+
+    def scaled(found: numbers.Accuracy | None) -> float:
+        value = None if found is None else getattr(found, each.error)
+        return np.nan if value is None else each.error_scale * value
+
+    return OffsetRun(
+        np.array(offset),
+        np.array(started is not None),
+        np.array(first_two[0]),
+        np.array(first_two[1]),
+        np.array(frames),
+        np.array(len(which)),
+        np.array(sum(frame.state == running.LOST for frame in done.frames)),
+        np.array(len(which) / frames),
+        np.array(kept / later if started is not None else np.nan),
+        np.array(scaled(final)),
+        np.array(scaled(live)),
+        np.array(scaled(second)),
+        np.array(np.nan if final.drift is None else final.drift),
+        np.array(0 if visual_map is None else len(visual_map.keyframes)),
+        np.array(0 if visual_map is None else int(visual_map.alive.sum())),
+        np.array(done.no_start() or "", f"<U{REASON_LENGTH}"),
+    )

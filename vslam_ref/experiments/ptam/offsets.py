@@ -1,0 +1,145 @@
+"""The table by which PTAM is judged: recorded sequences, ten first pictures each, bounds fixed before.
+
+::
+
+    recorded.toml: sequence, offset -> Ptam -> shares with a pose, error of the final and the live path
+                                                -> median of the ten against each bound; all ten are told
+
+A run that has no map after so many pictures as the table allows ends there, and counts as one that tracked
+nothing.  Everything else is in the run's own words: a lost picture has no pose, and a wrong path its error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vslam_ref.datasets import catalogue
+from vslam_ref.experiments.framework import Experiment, Study
+from vslam_ref.experiments.ptam import running
+from vslam_ref.experiments.ptam.offset_claims import claims, counted
+from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
+from vslam_ref.experiments.ptam.recorded import open_recorded, recorded
+from vslam_ref.support.config import assume
+from vslam_ref.systems.ptam.settings import Settings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ALL = ("kitchen", "tsukuba", "kitti", "alva", "vtest")
+
+
+@dataclass(frozen=True)
+class OffsetsConfig:
+    """Which runs."""
+
+    sequences: tuple[str, ...] = assume(ALL, "", "all of the table; those that are not found are left out")
+    runs: int = assume(10, "offsets", "all of the table")
+    pictures: int = assume(0, "pictures", "of a run at most; 0: to the last")
+    seed: int = assume(0, "", "of the system's one generator, as it comes")
+
+    def __post_init__(self) -> None:
+        """Refuse what the table does not have."""
+        unknown = [name for name in self.sequences if name not in recorded()]
+        if unknown or not self.sequences:
+            raise ValueError(f"sequences={', '.join(self.sequences)}: need some of {', '.join(recorded())}")
+        if not 1 <= self.runs <= 10 or self.pictures < 0 or self.seed < 0:
+            given = f"runs={self.runs}, pictures={self.pictures}, seed={self.seed}"
+            raise ValueError(f"{given}: need 1 to 10 runs, and no number below 0")
+
+
+def available(config: OffsetsConfig) -> list[str]:
+    """Names of the sequences that are found, in the table's order."""
+    return [n for n in recorded() if n in config.sequences and catalogue.find(recorded()[n].data_set)]
+
+
+def missing(config: OffsetsConfig) -> list[str]:
+    """Data sets that a run needs: all that are asked for, if none of them is found."""
+    return [] if available(config) else [recorded()[name].data_set for name in config.sequences]
+
+
+def offsets(config: OffsetsConfig, name: str) -> Sequence[int]:
+    """First pictures of the runs of one sequence."""
+    return list(recorded()[name].offsets[: config.runs])
+
+
+def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
+    """Run PTAM from one offset to the end."""
+    each = recorded()[name]
+    sequence = open_recorded(each, offset, config.pictures or None)
+
+    def stop(done: running.Run) -> bool:
+        return done.system.map is None and len(done.frames) >= each.start_within
+
+    done = running.run(sequence, replace(Settings(), seed=config.seed), stop)
+    return told(each, offset, done)
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def series(study: Study[dict[str, OffsetRun]]) -> dict[str, object]:
+    """All runs by sequence, with the bounds and what other programs reached."""
+    table = recorded()
+    return {
+        name: {"unit": table[name].error_unit, "beside": list(table[name].beside)}
+        | {field: np.asarray(values).tolist() for field, values in runs._asdict().items()}
+        for name, runs in study.data.items()
+    }
+
+
+def figure(study: Study[dict[str, OffsetRun]]) -> Figure:
+    """Shares and errors of all runs against the bounds and the other programs."""
+    from vslam_ref.plot.offsets import OffsetRows, offsets_figure
+
+    rows = []
+    for name, runs in study.data.items():
+        each = recorded()[name]
+        if each.must_not_start or each.most_error is None:
+            continue
+        beside = {str(b["system"]): float(b["error"]) / each.most_error for b in each.beside if "error" in b}
+        share = np.where(runs.started, counted(runs.share_all), 0.0)
+        rows.append(
+            OffsetRows(name, share, np.asarray(runs.error, float) / each.most_error, each.least_all, beside,
+                       f"{each.most_error:g} {each.error_unit}")
+        )  # fmt: skip
+    return offsets_figure(rows)
+
+
+EXPERIMENT = Experiment(
+    id="ptam-offsets",
+    title="PTAM on recorded sequences, from ten first pictures each",
+    source="A, chapter 2",
+    config_type=OffsetsConfig,
+    simulate=simulate,
+    points=available,
+    name=str,
+    seeds=offsets,
+    series=series,
+    claims=claims,
+    figure=figure,
+    sample=lambda study: sum(len(runs.offset) for runs in study.data.values()),
+    missing=missing,
+    about={
+        "offset": "first picture; (runs,)",
+        "started": "whether there was a map in time; (runs,)",
+        "first": "first picture of the start, -1 without one; (runs,)",
+        "second": "second picture of the start, -1 without one; (runs,)",
+        "frames": "pictures from the offset on; (runs,)",
+        "tracked": "pictures with a pose; (runs,)",
+        "lost": "pictures lost after the start; (runs,)",
+        "share_all": "pictures with a pose over all; (runs,)",
+        "share_after": "pictures with a pose over those after the start; (runs,)",
+        "error": "error of the final path, in the table's unit; (runs,)",
+        "live": "error of the live path, in the table's unit; (runs,)",
+        "second_error": "distance from the other path, in the table's unit; (runs,)",
+        "drift": "scale of the last third over that of the first; (runs,)",
+        "keyframes": "keyframes; (runs,)",
+        "points": "points of the map; (runs,)",
+        "reason": "why there was no start; (runs,)",
+    },
+    quick={"sequences": ("tsukuba",), "runs": 1, "pictures": 40},
+)
