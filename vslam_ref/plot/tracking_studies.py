@@ -86,3 +86,37 @@ def turning_figure(arms: Array, reached: Array, points: Array, view: float, turn
         right.set_ylabel("points that the turn added")
         style.legend_below(figure, left, 3)
     return figure
+
+
+WAYS = ((style.VERMILION, "--", "s"), (style.ORANGE, "-.", "^"), (style.BLUE, "-", "o"))
+
+
+def passes_figure(pixels: Array, shares: Array, compared: Array, names: Sequence[str], sure: float) -> Figure:
+    """Draw how many jumps were tracked, and the work, over their size.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (S,)
+        Size of the jump.
+    shares, compared : ndarray, shape (ways, S)
+        Share tracked, and patches compared with corners.
+    names : sequence of str
+        Of the ways.
+    sure : float
+        Share from which a motion counts as trackable.
+    """
+    with style.house_style():
+        figure, (left, right) = style.new_figure(4.0, 2)
+        for i, name in enumerate(names):
+            colour, line, mark = WAYS[i]
+            left.plot(pixels, 100 * shares[i], line, marker=mark, color=colour, ms=5, label=name)
+            right.plot(pixels, compared[i], line, marker=mark, color=colour, ms=5)
+        _limit(left, 100 * sure, "trackable")
+        left.set_ylim(-3, 103)
+        left.set_ylabel("jumps tracked [%]")
+        right.set_yscale("log")
+        right.set_ylabel("patches compared with corners")
+        for panel in (left, right):
+            panel.set_xlabel("jump between two pictures [px]")
+        style.legend_below(figure, left, 4)
+    return figure

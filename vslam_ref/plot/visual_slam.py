@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -177,3 +178,15 @@ def _time(panel: Axes, course: CourseDrawing) -> None:
         panel.set_yscale("log")
     panel.set_ylabel("time [ms]")
     panel.legend(loc="upper right", frameon=False, ncols=2)
+
+
+def pictures_figure(images: Sequence[NDArray[np.uint8]], titles: Sequence[str]) -> Figure:
+    """Draw pictures (H, W, 3) beside each other."""
+    with style.house_style():
+        figure, panels = style.new_figure(3.0, len(images))
+        for panel, image, title in zip(panels, images, titles, strict=True):
+            panel.imshow(image, interpolation="antialiased")
+            panel.set(xticks=[], yticks=[])
+            panel.grid(False)
+            panel.set_title(title, fontsize=9)
+    return figure

@@ -198,8 +198,8 @@ def _lost(study: Study[TurningRun]) -> Claim:
         "A keyframe method that turns on the spot to new things is lost when the old ones leave the picture",
         f"arm 0: in every run the last pose lies before one field of view, {view:.0f} degrees",
         bool(holds.all()),
-        f"Turning on the spot, the camera was lost after {_list(np.sort(runs.lost_at))} degrees; the field of "
-        f"view has {view:.0f}",
+        f"Turning on the spot, the camera was lost after {_list(np.sort(runs.lost_at))} degrees; the field "
+        f"of view has {view:.0f}",
         {"lost_at_deg": runs.lost_at.tolist(), "field_of_view_deg": view},
         share=float(holds.mean()),
     )
