@@ -12,16 +12,16 @@ import pytest
 
 from vslam_ref.estimation.bundle.local import local_problem
 from vslam_ref.estimation.triangulation import triangulate
-from vslam_ref.features import finest_from_level
+from vslam_ref.features import finest_from_level, level_from_finest
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole
 from vslam_ref.geometry.multiview import Views
 from vslam_ref.systems.ptam import policy
-from vslam_ref.systems.ptam.look import peaks
+from vslam_ref.systems.ptam.look import peaks, prepare
 from vslam_ref.systems.ptam.mapper import book, curve_search, new_points
 from vslam_ref.systems.ptam.mapper.associate import seldom_found
-from vslam_ref.systems.ptam.settings import Settings
+from vslam_ref.systems.ptam.settings import FeatureSettings, Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.visual_map import VisualMap, local_active, neighbours
 from vslam_ref.systems.visual_map.adjusting import as_problem
@@ -153,14 +153,43 @@ def test_who_dies() -> None:
     assert 0 < len(expected) < visual_map.alive.sum()
 
 
-def test_free_corners() -> None:
-    """Whole numbers of pixels: 6, 8 gives 10 exactly, and that is far enough in both."""
-    visual_map = a_map()
-    seen = [visual_map.sightings["uv"][0]] if len(visual_map.measured_in(1)) else []
-    xy = np.array([[50, 50], [56, 58], [59, 50], [61, 50], [10, 90]])
-    fast = new_points.free(visual_map, 1, xy, 0, 10.0)
-    assert fast.tolist() == [book.is_free((int(x), int(y)), seen, 10.0) for x, y in xy]
-    assert fast.tolist() == [False, True, False, True, True]
+@pytest.mark.parametrize("level", [0, 1, 2, 3])
+def test_free_corners(level: int) -> None:
+    """Points at whole pixels of every level; 6, 8 from one is 10 exactly, and that is far enough in both."""
+    rng = np.random.default_rng(level)
+    visual_map = VisualMap(CAMERAS[0], (480, 640), 4)
+    visual_map.add_keyframe(np.eye(4), prepare(0, np.zeros((480, 640), np.uint8), FeatureSettings()))
+    at = rng.integers(0, 4, 60)
+    xy_level = np.stack([rng.integers(2, 75, 60), rng.integers(2, 55, 60)], 1)
+    uv = np.stack([finest_from_level(xy, k) for xy, k in zip(xy_level.astype(float), at, strict=True)])
+    for k in range(4):
+        visual_map.add_points(np.ones((np.sum(at == k), 3)), 0, k, uv[at == k])
+    seen = [(level_from_finest(place, level), int(k)) for place, k in zip(uv, at, strict=True)]
+    steps = np.array([[0, 0], [6, 8], [9, 0], [10, 0], [0, -7]])
+    middles = np.concatenate([xy_level[at == level], np.rint([place for place, _ in seen[:20]]).astype(int)])
+    xy = (middles[:, None] + steps).reshape(-1, 2)
+    fast = new_points.free(visual_map, 0, xy, level, 10.0)
+    assert fast.tolist() == [book.is_free((int(x), int(y)), level, seen, 10.0) for x, y in xy]
+    assert 0 < fast.sum() < len(fast)
+
+
+def test_fine_points_leave_room_for_coarse_ones() -> None:
+    """A picture full of points of the finest level blocks its own level, and no coarser one."""
+    visual_map = VisualMap(Pinhole(500.0, 500.0, 319.5, 239.5), (480, 640), 4)
+    grey = np.zeros((480, 640), np.uint8)
+    visual_map.add_keyframe(np.eye(4), prepare(0, grey, FeatureSettings()))
+    uv = np.stack(np.meshgrid(np.arange(8.0, 640, 8), np.arange(8.0, 480, 8)), -1).reshape(-1, 2)
+    visual_map.add_points(np.ones((len(uv), 3)), 0, 0, uv)
+    asked = {0: [320, 240], 1: [160, 120], 3: [40, 30]}
+    free = {
+        level: bool(new_points.free(visual_map, 0, np.array([xy]), level, 10.0)[0])
+        for level, xy in asked.items()
+    }
+    assert free == {0: False, 1: True, 3: True}
+    visual_map.add_points(np.ones((1, 3)), 0, 1, np.array([[320.0, 240.0]]))
+    # a point of level 1 takes room on its own level and the finer one, not on coarser ones
+    assert not new_points.free(visual_map, 0, np.array([[160, 120]]), 1, 10.0)[0]
+    assert new_points.free(visual_map, 0, np.array([[80, 60]]), 2, 10.0)[0]
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -54,9 +54,11 @@ def test_new_points_lie_on_the_wall(wall: Any, pair: VisualMap, settings: Settin
 def test_no_new_point_beside_a_known_one(wall: Any, pair: VisualMap, settings: Settings) -> None:
     numbers = new_points.new_points(pair, 1, wall.pictures[1], settings.mapper, settings.features)
     seen = pair.sightings
-    old = seen["uv"][(seen["kf"] == 1) & (seen["point"] < 6)]
-    new = pair.points["source_uv"][numbers]
-    away = np.hypot(*(new[:, None] - old).transpose(2, 0, 1)).min(1)
+    known = (seen["kf"] == 1) & (seen["point"] < 6)
+    old, old_level = seen["uv"][known], seen["level"][known]
+    new, level = pair.points["source_uv"][numbers], pair.points["source_level"][numbers]
+    alike = (old_level == level[:, None]) | (old_level == level[:, None] + 1)  # its own and the next one
+    away = np.where(alike, np.hypot(*(new[:, None] - old).transpose(2, 0, 1)), np.inf).min(1)
     assert (away >= settings.mapper.spacing * level_sigma(pair.points["source_level"][numbers]) - 1e-9).all()
     again = new_points.new_points(pair, 1, wall.pictures[1], settings.mapper, settings.features)
     assert len(again) < 0.5 * len(numbers)

@@ -46,9 +46,10 @@ def wants_keyframe(now: Now, s: KeyframeSettings) -> bool:
     return fewer or now.inliers < s.much_fewer * now.best or now.away > s.far
 
 
-def is_free(corner: Corner, seen: list[Array], spacing: float) -> bool:
-    """Whether no point (2,) that the keyframe sees lies near a corner; pixels of the corner's level."""
-    return all(np.hypot(*(np.array(corner) - uv)) >= spacing for uv in seen)
+def is_free(corner: Corner, level: int, seen: list[tuple[Array, int]], spacing: float) -> bool:
+    """Whether no point (2,) of a level or the next one lies near a corner; all in pixels of its level."""
+    near = [uv for uv, at in seen if at in (level, level + 1)]
+    return all(np.hypot(*(np.array(corner) - uv)) >= spacing for uv in near)
 
 
 def curve_distance(camera: Camera, bearing_a: Array, u_b: Array, T_b_a: Array) -> float:

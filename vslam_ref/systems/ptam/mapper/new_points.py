@@ -120,11 +120,17 @@ def median_depth(visual_map: VisualMap, kf: int) -> float:
 
 
 def free(visual_map: VisualMap, kf: int, xy: Pixels, level: int, spacing: float) -> BoolArray:
-    """Which corners (n, 2) are ``spacing`` pixels of a level away from all that the keyframe sees, (n,)."""
+    """Which corners (n, 2) are ``spacing`` pixels of a level away from what the keyframe sees, (n,).
+
+    Only points of this level and the next coarser one count.  Ten pixels of the coarsest level are eighty of
+    the finest: if finer points counted, too, a picture full of them would leave no room for a coarse one, and
+    the coarse pass of the tracker lives on those.
+    """
     from scipy.spatial import cKDTree
 
     seen = visual_map.sightings
-    rows = (seen["kf"] == kf) & seen["on"]
+    alike = (seen["level"] == level) | (seen["level"] == level + 1)
+    rows = (seen["kf"] == kf) & seen["on"] & alike
     if not rows.any() or len(xy) == 0:
         return np.ones(len(xy), np.bool_)
     away, _ = cKDTree(level_from_finest(seen["uv"][rows], level)).query(xy, distance_upper_bound=spacing)
