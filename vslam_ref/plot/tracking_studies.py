@@ -83,7 +83,7 @@ def turning_figure(arms: Array, reached: Array, points: Array, view: float, turn
         left.axhline(turn, color=style.GREY, lw=1.2, ls=":", label="whole turn")
         left.set_ylim(0, 1.08 * turn)
         left.set_ylabel("turned when last tracked [degrees]")
-        right.set_ylabel("points that the turn added")
+        right.set_ylabel("points where nothing was seen before")
         style.legend_below(figure, left, 3)
     return figure
 

@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vslam_ref.datasets import catalogue
 from vslam_ref.experiments.framework import Experiment, Study
 from vslam_ref.experiments.ptam import running
 from vslam_ref.experiments.ptam.offset_claims import claims, counted
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
-from vslam_ref.experiments.ptam.recorded import open_recorded, recorded
+from vslam_ref.experiments.ptam.recorded import found, open_recorded, recorded
 from vslam_ref.support.config import assume
 from vslam_ref.systems.ptam.settings import Settings
 
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ALL = ("kitchen", "tsukuba", "kitti", "alva", "vtest")
+SCENES = ("desk", "corridor")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class OffsetsConfig:
 
 def available(config: OffsetsConfig) -> list[str]:
     """Names of the sequences that are found, in the table's order."""
-    return [n for n in recorded() if n in config.sequences and catalogue.find(recorded()[n].data_set)]
+    return [name for name in recorded() if name in config.sequences and found(name)]
 
 
 def missing(config: OffsetsConfig) -> list[str]:
@@ -109,7 +109,31 @@ def figure(study: Study[dict[str, OffsetRun]]) -> Figure:
     return offsets_figure(rows)
 
 
-EXPERIMENT = Experiment(
+ABOUT = {
+    "offset": "first picture; (runs,)",
+    "started": "whether there was a map in time; (runs,)",
+    "first": "first picture of the start, -1 without one; (runs,)",
+    "second": "second picture of the start, -1 without one; (runs,)",
+    "frames": "pictures from the offset on; (runs,)",
+    "tracked": "pictures with a pose; (runs,)",
+    "lost": "pictures lost after the start; (runs,)",
+    "share_all": "pictures with a pose over all; (runs,)",
+    "share_after": "pictures with a pose over those after the start; (runs,)",
+    "error": "error of the final path, in the table's unit; (runs,)",
+    "live": "error of the live path, in the table's unit; (runs,)",
+    "second_error": "distance from the other path, in the table's unit; (runs,)",
+    "drift": "scale of the last third over that of the first; (runs,)",
+    "keyframes": "keyframes; (runs,)",
+    "points": "points of the map; (runs,)",
+    "reason": "why there was no start; (runs,)",
+}
+
+
+def _sample(study: Study[dict[str, OffsetRun]]) -> int:
+    return sum(len(runs.offset) for runs in study.data.values())
+
+
+EXPERIMENTS = (Experiment(
     id="ptam-offsets",
     title="PTAM on recorded sequences, from ten first pictures each",
     source="A, chapter 2",
@@ -121,25 +145,24 @@ EXPERIMENT = Experiment(
     series=series,
     claims=claims,
     figure=figure,
-    sample=lambda study: sum(len(runs.offset) for runs in study.data.values()),
+    sample=_sample,
     missing=missing,
-    about={
-        "offset": "first picture; (runs,)",
-        "started": "whether there was a map in time; (runs,)",
-        "first": "first picture of the start, -1 without one; (runs,)",
-        "second": "second picture of the start, -1 without one; (runs,)",
-        "frames": "pictures from the offset on; (runs,)",
-        "tracked": "pictures with a pose; (runs,)",
-        "lost": "pictures lost after the start; (runs,)",
-        "share_all": "pictures with a pose over all; (runs,)",
-        "share_after": "pictures with a pose over those after the start; (runs,)",
-        "error": "error of the final path, in the table's unit; (runs,)",
-        "live": "error of the live path, in the table's unit; (runs,)",
-        "second_error": "distance from the other path, in the table's unit; (runs,)",
-        "drift": "scale of the last third over that of the first; (runs,)",
-        "keyframes": "keyframes; (runs,)",
-        "points": "points of the map; (runs,)",
-        "reason": "why there was no start; (runs,)",
-    },
+    about=ABOUT,
     quick={"sequences": ("tsukuba",), "runs": 1, "pictures": 40},
-)
+), Experiment(
+    id="ptam-scenes",
+    title="PTAM on rendered scenes with exact truth",
+    source="A, chapter 2",
+    config_type=OffsetsConfig,
+    defaults={"sequences": SCENES, "runs": 5},
+    simulate=simulate,
+    points=available,
+    name=str,
+    seeds=offsets,
+    series=series,
+    claims=claims,
+    figure=figure,
+    sample=_sample,
+    about=ABOUT,
+    quick={"sequences": ("desk",), "runs": 1, "pictures": 40},
+))  # fmt: skip

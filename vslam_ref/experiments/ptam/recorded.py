@@ -1,4 +1,4 @@
-"""The recorded pictures that PTAM is judged on, from ``recorded.toml``: offsets and bounds, fixed before.
+"""The pictures that PTAM is judged on, from ``recorded.toml``: first pictures and bounds, fixed before.
 
 ::
 
@@ -28,9 +28,11 @@ class RecordedSequence:
 
     Attributes
     ----------
-    name, data_set, what : str
+    name, what : str
+    data_set : str
+        Empty for a rendered scene of this name.
     offsets : tuple of int
-        First pictures of the runs.
+        First pictures of the runs; of a rendered scene, its seeds.
     start_within : int
         Pictures within which a run must have started.
     error : {"rmse", "percent"}
@@ -47,11 +49,11 @@ class RecordedSequence:
     """
 
     name: str
-    data_set: str
     what: str
     offsets: tuple[int, ...]
     start_within: int
     seen: bool
+    data_set: str = ""
     least_all: float | None = None
     least_after: float | None = None
     error: str = "rmse"
@@ -84,10 +86,18 @@ def open_recorded(each: RecordedSequence, offset: int, pictures: int | None = No
     ValueError
         If the data set is not found, with where to get it.
     """
+    if not each.data_set:
+        return open_sequence(f"{each.name}:{offset}").part(0, pictures)
     folder = catalogue.require(each.data_set)
     camera = Pinhole(*each.camera) if each.camera else None
     end = None if pictures is None else offset + pictures
     return open_sequence(folder, camera=camera).part(offset, end, 1)
+
+
+def found(name: str) -> bool:
+    """Whether the pictures of a row are here: those of a rendered scene always are."""
+    each = recorded()[name]
+    return not each.data_set or catalogue.find(each.data_set) is not None
 
 
 def second_path(each: RecordedSequence) -> Trajectory | None:
