@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -119,4 +119,37 @@ def passes_figure(pixels: Array, shares: Array, compared: Array, names: Sequence
         for panel in (left, right):
             panel.set_xlabel("jump between two pictures [px]")
         style.legend_below(figure, left, 4)
+    return figure
+
+
+BACKENDS = {"numpy": (style.ORANGE, "-."), "numba": (style.BLUE, "-")}
+
+
+def rates_figure(rates: Mapping[str, Mapping[str, Array]], marks: Sequence[float]) -> Figure:
+    """Draw how many pictures are done at a rate or a higher one.
+
+    Parameters
+    ----------
+    rates : mapping of mapping of ndarray
+        Scene -> backend -> pictures a second of every picture.
+    marks : sequence of float
+        Rates to be marked.
+    """
+    with style.house_style():
+        figure, panels = style.new_figure(4.0, len(rates), sharey=True)
+        for panel, (name, curves) in zip(panels, rates.items(), strict=True):
+            for backend, values in curves.items():
+                colour, line = BACKENDS.get(backend, (style.BLACK, "-"))
+                x = np.sort(values.ravel())
+                y = 100 * (1 - np.arange(len(x)) / max(len(x), 1))
+                panel.step(x, y, line, color=colour, where="pre", label=backend)
+            for mark in marks:
+                panel.axvline(mark, color=style.GREY, lw=1.0, ls=":")
+                panel.text(mark, 101, f"{mark:g}", ha="center", fontsize=9, color=style.GREY)
+            panel.set_title(name, pad=14)
+            panel.set_xlabel("pictures a second, or more")
+            panel.set_xlim(left=0)
+            panel.set_ylim(0, 100)
+        panels[0].set_ylabel("pictures done at that rate [%]")
+        style.legend_below(figure, panels[0], 2)
     return figure
