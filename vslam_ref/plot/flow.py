@@ -12,7 +12,10 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from vslam_ref.plot import style
 
-WIDE, HIGH, STEP = 1.5, 0.78, 1.95
+WIDE, HIGH, STEP, UP, GAP = 1.5, 0.78, 1.95, 2.3, 0.06
+"""Of the boxes: width, height, from one to the next, from row to row, and from a box to an arrow."""
+PALE = "#F2F2F2"
+WHITE = {"fc": "white", "ec": "none", "pad": 1.5}
 
 
 class Box(NamedTuple):
@@ -24,53 +27,55 @@ class Box(NamedTuple):
 
 
 def flow_figure(tracker: Sequence[Box], mapper: Sequence[Box], pictures: int, keyframes: int) -> Figure:
-    """Draw the tracker's boxes in the upper row, the mapper's in the lower one, and what goes between."""
+    """Draw a loop: the tracker from left to right, the mapper below from right to left, and the map."""
     with style.house_style():
-        figure, (panel,) = style.new_figure(4.4)
+        figure, (panel,) = style.new_figure(4.0)
         panel.grid(False)
         panel.set(xticks=[], yticks=[])
         for spine in panel.spines.values():
             spine.set_visible(False)
-        count = max(len(tracker), len(mapper))
-        panel.set_xlim(-1.9, count * STEP - 0.1)
-        panel.set_ylim(-1.15, 3.35)
-        _row(panel, tracker, 2.2, style.SKY, f"tracking:\nevery picture\n({pictures})")
-        _row(panel, mapper, 0.0, style.ORANGE, f"mapping:\nkeyframes\n({keyframes})")
-        last = (len(mapper) - 1) * STEP
-        _arrow(panel, (last, 2.2 - HIGH / 2), (0.0, HIGH / 2), "keyframe: picture, pose, points found", 0.62)
-        _arrow(panel, (last, -HIGH / 2), (last + 0.9 * STEP, 2.2 - HIGH / 2), "", -0.35)
-        panel.text(last + 0.52 * STEP, -0.75, "the map: poses of keyframes, points", ha="center", fontsize=9)
+        count = max(len(tracker), len(mapper) + 1)
+        panel.set_xlim(-1.75, count * STEP - 0.9)
+        panel.set_ylim(-0.75, 3.1)
+        _row(panel, tracker, UP, style.SKY, range(len(tracker)))
+        _row(panel, mapper, 0.0, style.ORANGE, range(count - 1, count - 1 - len(mapper), -1))
+        _box(panel, 0.0, 0.0, style.GREEN, "the map", "keyframes, points")
+        _arrow(panel, ((count - 1 - len(mapper)) * STEP + STEP - WIDE / 2 - GAP, 0.0), (WIDE / 2 + GAP, 0.0))
+        _arrow(panel, (0.0, HIGH / 2 + GAP), (2 * STEP - 0.3, UP - HIGH / 2 - GAP))
+        panel.text(0.62 * STEP, UP / 2 - 0.02, "is read", fontsize=9, bbox=WHITE)
+        end = (count - 1) * STEP
+        _arrow(panel, (end, UP - HIGH / 2 - GAP), (end, HIGH / 2 + GAP))
+        panel.text(end - 0.1, UP / 2, "keyframe: picture, pose,\nand what was found", fontsize=9, ha="right",
+                   va="center", bbox=WHITE)  # fmt: skip
+        panel.text(-0.95, UP, f"tracking:\n{pictures} pictures", ha="right", va="center", fontsize=10)
+        panel.text(-0.95, 0.0, f"mapping:\n{keyframes} keyframes", ha="right", va="center", fontsize=10)
     return figure
 
 
-def _row(panel: Axes, boxes: Sequence[Box], y: float, colour: str, title: str) -> None:
-    panel.text(-1.0, y, title, ha="right", va="center", fontsize=10)
-    for k, box in enumerate(boxes):
-        x = k * STEP
-        used = box.pictures > 0
-        panel.add_patch(
-            FancyBboxPatch((x - WIDE / 2, y - HIGH / 2), WIDE, HIGH, boxstyle="round,pad=0.04",
-                           fc=colour if used else "#F2F2F2", ec=style.BLACK, alpha=0.85,
-                           ls="-" if used else ":")
-        )  # fmt: skip
-        told = f"{box.pictures}×, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
-        panel.text(x, y + 0.12, box.name, ha="center", va="center", fontsize=10, fontweight="bold")
-        panel.text(x, y - 0.2, told, ha="center", va="center", fontsize=8.5)
+def _row(panel: Axes, boxes: Sequence[Box], y: float, colour: str, places: Sequence[int]) -> None:
+    for k, (box, place) in enumerate(zip(boxes, places, strict=True)):
+        told = f"{box.pictures} times, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
+        _box(panel, place * STEP, y, colour if box.pictures else PALE, box.name, told)
         if k:
-            _arrow(panel, (x - STEP + WIDE / 2 + 0.05, y), (x - WIDE / 2 - 0.05, y), "", 0.0)
-    if boxes:
-        panel.add_patch(
-            FancyArrowPatch((-0.95, y), (-WIDE / 2 - 0.05, y), arrowstyle="-|>", mutation_scale=13)
-        )
+            side = np.sign(place - places[k - 1])
+            start, end = (
+                places[k - 1] * STEP + side * (WIDE / 2 + GAP),
+                place * STEP - side * (WIDE / 2 + GAP),
+            )
+            _arrow(panel, (float(start), y), (float(end), y))
 
 
-def _arrow(
-    panel: Axes, start: tuple[float, float], end: tuple[float, float], words: str, above: float
-) -> None:
+def _box(panel: Axes, x: float, y: float, colour: str, name: str, told: str) -> None:
     panel.add_patch(
-        FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=13, color=style.BLACK, lw=1.1)
-    )
-    if words:
-        middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
-        panel.text(middle[0], middle[1] + above * 0.3, words, ha="center", fontsize=9,
-                   bbox={"fc": "white", "ec": "none", "pad": 1.5})  # fmt: skip
+        FancyBboxPatch((x - WIDE / 2, y - HIGH / 2), WIDE, HIGH, boxstyle="round,pad=0.04", fc=colour,
+                       ec=style.BLACK, alpha=0.85, ls=":" if colour == PALE else "-")
+    )  # fmt: skip
+    panel.text(x, y + 0.12, name, ha="center", va="center", fontsize=10, fontweight="bold")
+    panel.text(x, y - 0.2, told, ha="center", va="center", fontsize=8)
+
+
+def _arrow(panel: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+    panel.add_patch(
+        FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=13, color=style.BLACK, lw=1.1,
+                        shrinkA=0, shrinkB=0)
+    )  # fmt: skip
