@@ -173,7 +173,7 @@ def _print_summary(verdicts: Sequence[str], not_run: int, out: Path) -> None:
     from vslam_ref.experiments.framework.claims import VERDICTS
 
     counts = ", ".join(f"{verdicts.count(v)} {v}" for v in VERDICTS)
-    rest = f"; {not_run} experiments not run" if not_run else ""
+    rest = f"; {not_run} experiment{'s' if not_run > 1 else ''} not run" if not_run else ""
     print(f"{len(verdicts)} claims: {counts}{rest}; open {out / 'index.html'}", flush=True)
 
 
