@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from vslam_ref.datasets import catalogue, trajectories
+from vslam_ref.datasets.pictures import Picture
 from vslam_ref.datasets.sequences import Sequence, open_sequence
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.metrics.trajectory import Trajectory
+from vslam_ref.worlds.rendered import Effects, scene
 
 TABLE = Path(__file__).with_name("recorded.toml")
 
@@ -43,6 +45,8 @@ class RecordedSequence:
         File of another path in the data set, or empty.
     camera : tuple of float
         fx, fy, cx, cy where the data set has no camera.
+    noise, exposure : float
+        Of a rendered scene: grey levels, and a share.
     must_not_start, seen : bool
     beside : tuple of mapping
         Of other systems.
@@ -63,6 +67,8 @@ class RecordedSequence:
     second: str = ""
     most_second: float | None = None
     camera: tuple[float, ...] = ()
+    noise: float = 0.0
+    exposure: float = 0.0
     must_not_start: bool = False
     beside: tuple[Mapping[str, Any], ...] = field(default=())
 
@@ -87,7 +93,9 @@ def open_recorded(each: RecordedSequence, offset: int, pictures: int | None = No
         If the data set is not found, with where to get it.
     """
     if not each.data_set:
-        return open_sequence(f"{each.name}:{offset}").part(0, pictures)
+        made = scene(each.name, offset, effects=Effects(noise=each.noise, exposure=each.exposure))
+        exact = open_sequence(f"{each.name}:{offset}").part(0, pictures)
+        return replace(exact, picture=lambda k: Picture(made.frame(k)))
     folder = catalogue.require(each.data_set)
     camera = Pinhole(*each.camera) if each.camera else None
     end = None if pictures is None else offset + pictures
