@@ -3,8 +3,8 @@
     vslam-ref reproduce ptam-offsets ptam-scenes --out out
     python docs/_tools/offsets_page.py out
 
-The runs take minutes and need recorded data, so the page is committed with the numbers of one run.  Nothing on it
-is written by hand but the words around the tables.
+The runs take minutes and need recorded data, so the page is committed with the numbers of one run.  Nothing
+on it is written by hand but the words around the tables.
 """
 
 from __future__ import annotations
@@ -21,27 +21,29 @@ import book
 
 PAGE = book.DOCS / "ptam-offsets.md"
 FIGURES = book.DOCS / "_static"
+CAPTION = "Each dot is a run; the line is their median, dashed is the bound."
 HEAD = """\
 # PTAM from ten first pictures
 
-How good is the system of [chapter 12](chapters/12_ptam.md)? One run over one clip says little: where it begins
-decides which two pictures make the map. So every recorded sequence is run from ten first pictures, written down
-in a table before the runs, and the median is judged. All ten are shown. To repeat it, with the data sets:
+How good is the system of [chapter 12](chapters/12_ptam.md)? One run over one clip says little: where it
+begins decides which two pictures make the map. So every recorded sequence is run from ten first pictures,
+written down in a table before the runs, and the median is judged. All ten are shown. To repeat it, with the
+data sets:
 
 ```sh
 vslam-ref reproduce ptam-offsets ptam-scenes --out out
 ```
 
-A run that has no map in time counts as one that tracked nothing. "Of all" are the pictures from the first one to
-the last; those between the two of the start are tracked afterwards, and count. The error is that of the final
-path, root mean square, after a similarity. The live path is what was told at each picture, before anything later
-could mend it. The drift is the scale of the last third of the path over that of the first: 1 is none, below 1 the
-map grew.
+A run that has no map in time counts as one that tracked nothing. "Of all" are the pictures from the first one
+to the last; those between the two of the start are tracked afterwards, and count. The error is that of the
+final path, root mean square, after a similarity. The live path is what was told at each picture, before
+anything later could mend it. The drift is the scale of the last third of the path over that of the first: 1 is
+none, below 1 the map grew.
 
-**How much this proves.** The system's settings were chosen while looking at the kitchen, at Tsukuba, at KITTI and
-at alva; the fixed camera and the rendered scenes of these seeds were not looked at. The kitchen's truth is itself
-worth 3 to 4 cm: no error below that can be told from it, and the distance from COLMAP's path is the second
-opinion. alva has no truth; its unit is a tenth of COLMAP's path.
+**How much this proves.** The system's settings were chosen while looking at the kitchen, at Tsukuba, at KITTI
+and at alva; the fixed camera and the rendered scenes of these seeds were not looked at. The kitchen's truth is
+itself worth 3 to 4 cm: no error below that can be told from it, and the distance from COLMAP's path is the
+second opinion. alva has no truth; its unit is a tenth of COLMAP's path.
 """
 
 
@@ -78,7 +80,7 @@ def summary(series: dict[str, Any]) -> str:
         share = [s if started else 0.0 for s, started in zip(runs["share_all"], runs["started"], strict=True)]
         finite = [e for e in runs["error"] if e is not None and math.isfinite(e)]
         rows.append([
-            f"**{name}**", f"{sum(runs['started'])} of {len(runs['started'])}", percent(statistics.median(share)),
+            f"**{name}**", f"{sum(runs['started'])} of {len(share)}", percent(statistics.median(share)),
             percent(middle(runs["share_after"])), f"{shown(middle(runs['error']))} {runs['unit']}",
             shown(max(finite)), shown(middle(runs["drift"])),
         ])  # fmt: skip
@@ -92,9 +94,10 @@ def summary(series: dict[str, Any]) -> str:
 
 
 def every_run(name: str, runs: dict[str, Any]) -> str:
-    """All runs of a sequence, folded."""
+    """All runs of a sequence."""
     rows = [
-        [str(runs["offset"][k]), "–" if not runs["started"][k] else f"{runs['first'][k]}, {runs['second'][k]}",
+        [str(runs["offset"][k]),
+         "–" if not runs["started"][k] else f"{runs['first'][k]}, {runs['second'][k]}",
          percent(runs["share_all"][k]), percent(runs["share_after"][k]), shown(runs["error"][k]),
          shown(runs["live"][k]), shown(runs["second_error"][k]), shown(runs["drift"][k]),
          str(runs["keyframes"][k]), str(runs["points"][k])]
@@ -104,7 +107,7 @@ def every_run(name: str, runs: dict[str, Any]) -> str:
              "keyframes", "points"]  # fmt: skip
     reasons = sorted({r for r in runs["reason"] if r})
     told = "".join(f"\n\nNo start: {reason}" for reason in reasons)
-    return f":::{{dropdown}} {name}: every run\n{table(heads, rows)}{told}\n:::"
+    return f"### {name}: every run\n\n{table(heads, rows)}{told}"
 
 
 def verdicts(result: dict[str, Any]) -> str:
@@ -132,7 +135,7 @@ def main(arguments: list[str]) -> int:
         parts += [
             f"## {title}",
             summary(result["series"]),
-            f"```{{figure}} _static/{id}.png\nEach dot is a run; the line is their median, dashed is the bound.\n```",
+            f"```{{figure}} _static/{id}.png\n{CAPTION}\n```",
             "\n\n".join(every_run(name, runs) for name, runs in result["series"].items()),
             f"### Bounds\n\n{verdicts(result)}",
             f"Measured with version {made['vslam_ref']}, backend {made.get('backend', 'numba')}, "
