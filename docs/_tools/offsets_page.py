@@ -37,12 +37,12 @@ vslam-ref reproduce ptam-offsets ptam-scenes --out out
 A run that has no map in time counts as one that tracked nothing. "Of all" are the pictures from the first one
 to the last; those between the two of the start are tracked afterwards, and count. The error is that of the
 final path, root mean square, after a similarity. The live path is what was told at each picture, before
-anything later could mend it. The drift is the scale of the last third of the path over that of the first: 1 is
-none, below 1 the map grew.
+anything later could mend it. The drift is the scale of the last third of the path over that of the first: 1
+is none, below 1 the map grew.
 
 **How much this proves.** The system's settings were chosen while looking at the kitchen, at Tsukuba, at KITTI
-and at alva; the fixed camera and the rendered scenes of these seeds were not looked at. The kitchen's truth is
-itself worth 3 to 4 cm: no error below that can be told from it, and the distance from COLMAP's path is the
+and at alva; the fixed camera and the rendered scenes of these seeds were not looked at. The kitchen's truth
+is itself worth 3 to 4 cm: no error below that can be told from it, and the distance from COLMAP's path is the
 second opinion. alva has no truth; its unit is a tenth of COLMAP's path.
 """
 
