@@ -122,6 +122,19 @@ class MapperSettings:
 
 
 @dataclass(frozen=True)
+class CameraSettings:
+    """Self-calibration at the end; every field has its own unit, beside it."""
+
+    refine: bool = assume(False, "", "the camera that was given is believed; the last adjustment may free it")
+    most_shift: float = assume(
+        0.005,
+        "of the picture's width",
+        "an intrinsic whose standard deviation moves a pixel farther is not determined, and stays",
+    )
+    steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
+
+
+@dataclass(frozen=True)
 class Settings:
     """PTAM as it runs."""
 
@@ -131,4 +144,5 @@ class Settings:
     tracker: TrackerSettings = field(default_factory=TrackerSettings)
     keyframe: KeyframeSettings = field(default_factory=KeyframeSettings)
     mapper: MapperSettings = field(default_factory=MapperSettings)
+    camera: CameraSettings = field(default_factory=CameraSettings)
     last_steps: int = assume(40, "", "of the adjustment of everything at the end")
