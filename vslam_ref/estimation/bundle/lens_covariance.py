@@ -11,10 +11,11 @@ With the columns of the lens behind those of the views, the reduced system and w
 Where a motion does not determine a combination of intrinsics, :math:`\Lambda` is singular.
 
 **One point, one error.**  A tracked point is compared with the patch of *one* picture: what is wrong with
-that patch is wrong in all its observations.  Errors are independent from point to point, not from observation
-to observation.  To first order the errors r of point j move the lens by :math:`I_j = -\sum (J x)^T r` over its
-observations, with x the columns of :math:`H^{-1}` that belong to the lens, and the covariance is the sum of
-:math:`I_j I_j^T`.  On rendered scenes its standard deviations are 1.3 to 1.6 times as large.
+that patch is wrong in all its observations.  Errors are independent from point to point, but not from
+observation to observation.  To first order the errors r of point j move the lens by
+:math:`I_j = -\sum (J x)^T r` over its observations, with x the columns of :math:`H^{-1}` that belong to the
+lens, and the covariance is the sum of :math:`I_j I_j^T`.  On rendered scenes its standard deviations are 1.3
+to 1.6 times as large.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class LensCovariance(NamedTuple):
 def lens_covariance(result: BundleResult) -> LensCovariance:
     """Covariance of the intrinsics that all views share.
 
-    Implements :eq:`eq-lens-covariance`.
+    Implements :eq:`eq-ba-covariance` for the columns of the lens.
 
     Parameters
     ----------

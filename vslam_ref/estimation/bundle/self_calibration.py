@@ -82,7 +82,7 @@ def self_calibrate(
 ) -> SelfCalibration:
     """Adjust a scene and the camera that took all its views.
 
-    Implements :eq:`eq-lens-refused`.
+    Implements :eq:`eq-a1-4` (A1.4) with the intrinsics free.
 
     Parameters
     ----------

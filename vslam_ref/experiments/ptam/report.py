@@ -7,6 +7,7 @@
     OUT/trajectory_live.txt       TUM: the poses as they were told when the pictures came
     OUT/keyframes.txt             TUM: the keyframes
     OUT/map.ply                   points in the grey of their pictures, keyframes as pyramids
+    OUT/camera.yaml               with --refine-camera: the camera, with standard deviations
     OUT/overlay.webm              the pictures with what was tracked, a grid on the plane, a house on it
     OUT/map.png                   the map and the path from three sides
     OUT/course.png                tracking over the pictures
@@ -29,8 +30,11 @@ from vslam_ref.arrays import Array
 from vslam_ref.datasets import trajectories
 from vslam_ref.datasets.bundle_files.ply import write_ply
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows, trajectory
+from vslam_ref.datasets.calibration_files import write_opencv
+from vslam_ref.experiments.ptam.camera import camera_file, camera_rows
+from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows
 from vslam_ref.experiments.ptam.overlay import find_plane
+from vslam_ref.experiments.ptam.paths import trajectory
 from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, WAITING, Run, path
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot.saving import figure_bytes
@@ -42,7 +46,10 @@ from vslam_ref.systems.visual_map import VisualMap
 from vslam_ref.systems.visual_map.adjusting import as_problem
 
 FILM = "overlay.webm"
-FILES = ("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", FILM, "result.json")
+FILES = (
+    *("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", "camera.yaml", FILM),
+    "result.json",
+)
 LEGEND = (
     "Points that were tracked: vermilion, yellow, sky blue, blue (and larger) on levels 0, 1, 2, 3 of the "
     "pyramid; green lines before the start: how corners moved. White: a grid on the dominant plane of the "
@@ -61,6 +68,8 @@ def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
         write_map(folder / "map.ply", visual_map)
         final = accuracy(run.sequence, *path(run))
         figures = {"map": map_figure(scene(run, visual_map, final), title), **figures}
+    if (found := camera_file(run)) is not None:
+        write_opencv(folder / "camera.yaml", found)
     for name, figure in figures.items():
         (folder / f"{name}.png").write_bytes(figure_bytes(figure, "png", "ptam"))
     write_text(folder / "result.json", to_json(content))
@@ -148,6 +157,7 @@ def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures
         _film(folder / FILM),
         pages.table([], number_rows(content), caption="Numbers", kind="numbers"),
         *images,
+        _camera(run),
         _start(content),
         _refusals(content["refusals"]),
         _plane(run),
@@ -170,6 +180,13 @@ def _film(path: Path) -> pages.Html | str:
         return ""
     film = pages.Html(f'<video src="{path.name}" controls muted loop playsinline></video><br>')
     return pages.tag("p", film, LEGEND)
+
+
+def _camera(run: Run) -> pages.Html | str:
+    """The camera as it was given and as it was refined."""
+    rows = camera_rows(run)
+    columns = ["", "given", "refined", "sigma", "unit"]
+    return pages.table(columns, rows, caption="The camera", kind="plain") if rows else ""
 
 
 def _start(content: Mapping[str, Any]) -> pages.Html | str:

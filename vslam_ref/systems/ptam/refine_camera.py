@@ -120,7 +120,8 @@ def without_lens_terms(given: Camera, found: Camera, refused: dict[str, Refused]
 def pixel_shift(given: Camera, refined: Camera, size: tuple[int, int]) -> PixelShift:
     """How far from a pixel the refined camera shows the ray that the given one has for it.
 
-    Implements :eq:`eq-camera-shift`, over all pixels of a picture of ``size`` (W, H) that both show.
+    Over all pixels of a picture of ``size`` (W, H) that both show.  A camera that only has another centre is
+    shifted by as much everywhere, although a turn of the camera looks almost the same.
     """
     uv = pixel_grid(size).reshape(-1, 2)
     rays = given.unproject(uv)
