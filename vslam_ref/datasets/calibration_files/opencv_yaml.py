@@ -72,12 +72,12 @@ def read_opencv(
     return CameraFile(camera, _size(entries), name=title, std=std)
 
 
-def _std(node: Node, count: int) -> Array:
+def _std(node: Node, count: int) -> tuple[float, ...]:
     """Standard deviations of the parameters."""
     values = node.matrix().ravel()
     if len(values) != count or not (values >= 0).all():
         raise node.error(f"{node.name}: expected {count} numbers, none below 0")
-    return values
+    return tuple(values.tolist())
 
 
 def _sensor(node: Node) -> Array:
@@ -155,7 +155,7 @@ def write_opencv(path: Path | str, file: CameraFile) -> None:
     if len(camera.params) > 4:
         lines += _matrix_lines("distortion_coefficients", camera.params[4:, None])
     if file.std is not None:
-        lines += _matrix_lines(STD, file.std[:, None])
+        lines += _matrix_lines(STD, np.array(file.std)[:, None])
     write_bytes(Path(path), ("\n".join(lines) + "\n").encode())
 
 

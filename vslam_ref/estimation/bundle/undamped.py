@@ -22,7 +22,11 @@ from vslam_ref.estimation.bundle.weights import whitened
 
 
 class Blocks(NamedTuple):
-    """Columns over all unknowns: views' coordinates and a waste row (D + 1, k), sorted points (N, 3, k)."""
+    """Columns over all unknowns, each row in its coordinate's unit: metres, radians, or the lens's.
+
+    ``view (D + 1, k)`` of the views' coordinates, the last row of what is fixed; ``point (N, 3, k)`` of the
+    sorted points.
+    """
 
     view: Array
     point: Array

@@ -129,5 +129,5 @@ def camera_file(run: Run) -> CameraFile | None:
     refined = run.system.refined
     if refined is None or refined.reason:
         return None
-    std = np.array([refined.sigma.get(name, 0.0) for name in refined.camera.names()])
+    std = tuple(refined.sigma.get(name, 0.0) for name in refined.camera.names())
     return CameraFile(refined.camera, run.sequence.size, std=std)

@@ -112,7 +112,7 @@ def adjust_with_camera(
         Intrinsics that may be freed.
     robust : Robust
     most_shift : float
-        As for :func:`~vslam_ref.estimation.bundle.self_calibration.self_calibrate`.
+        An intrinsic is refused if one standard deviation of it moves a pixel farther; widths of the picture.
     options : Options, optional
 
     Returns
