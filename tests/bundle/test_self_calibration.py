@@ -133,9 +133,9 @@ def test_a_wrong_camera_is_found_with_true_deviations(rng: np.random.Generator) 
 
 @pytest.mark.slow
 def test_deviations_with_an_error_of_each_point_are_those_of_repetition() -> None:
-    """200 films in which half of the variance is a point's own.  The spread of an intrinsic over its sigma has
-    a relative error of 1/400^(1/2), and so has the sigma of 200 clusters; six of both are allowed.  Sigmas of
-    independent sightings are too small, one of them by that much at least.
+    """200 films in which half of the variance is a point's own.  The spread of an intrinsic over its sigma
+    has a relative error of 1/400^(1/2), and so has the sigma of 200 clusters; six of both are allowed.
+    Sigmas of independent sightings are too small, one of them by that much at least.
     """
     z, independent = [], []
     for seed in range(200):
@@ -171,7 +171,7 @@ def test_a_motion_that_never_turns_leaves_focal_lengths_and_centre_open(rng: np.
     for name, why in found.refused.items():
         row = Radtan.names().index(name)
         assert found.camera.params[row] == GIVEN.params[row]
-        assert why.shift_px > 0.005 * SIZE[0] or name in ("p1", "p2")
+        assert why.shift_px > 0.02 * SIZE[0] or name in ("p1", "p2")
 
 
 def test_round_distortion_shows_the_ratio_of_focal_lengths_but_not_their_size(

@@ -78,7 +78,7 @@ def self_calibrate(
     size: tuple[int, int],
     robust: Robust | None = None,
     options: Options | None = None,
-    most_shift: float = 0.005,
+    most_shift: float = 0.02,
 ) -> SelfCalibration:
     """Adjust a scene and the camera that took all its views.
 
