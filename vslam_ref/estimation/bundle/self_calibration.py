@@ -78,7 +78,7 @@ def self_calibrate(
     size: tuple[int, int],
     robust: Robust | None = None,
     options: Options | None = None,
-    most_shift: float = 0.02,
+    most_shift_px: float = 5.0,
 ) -> SelfCalibration:
     """Adjust a scene and the camera that took all its views.
 
@@ -94,9 +94,8 @@ def self_calibrate(
         Width and height of the pictures, pixels.
     robust, options : Robust, Options, optional
         As for :func:`~vslam_ref.estimation.bundle.solver.bundle_adjust`.
-    most_shift : float
-        An intrinsic is refused if one standard deviation of it moves some pixel of the picture farther than
-        this share of the picture's width.
+    most_shift_px : float
+        An intrinsic is refused if one standard deviation of it moves some pixel of the picture farther.
 
     Returns
     -------
@@ -122,7 +121,7 @@ def self_calibrate(
             found = bundle_adjust(here, robust, options)
             certain = lens_covariance(found)
         shift = certain.sigma * _shift_per_unit(found.problem, size)[free]
-        worst = _worst(shift, certain, most_shift * size[0])
+        worst = _worst(shift, certain, most_shift_px)
         if worst is None:
             reason = _astray(start, found, size)
             if reason:

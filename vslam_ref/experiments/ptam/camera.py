@@ -79,7 +79,7 @@ def camera_notes(run: Run) -> list[str]:
     refined = run.system.refined
     if refined is None:
         return []
-    limit = run.settings.camera.most_shift * run.sequence.size[0]
+    limit = run.settings.camera.most_shift
     told = [refusal(name, refined, limit) for name in refined.refused]
     if refined.reason:
         return [*told, f"the camera is kept as it was given: {refined.reason}"]

@@ -74,7 +74,7 @@ def refine_camera(visual_map: VisualMap, settings: Settings) -> RefinedCamera:
         return RefinedCamera(given, given, {}, {}, nothing, PixelShift(0.0, 0.0), before)
     start, names = with_lens_terms(given), free_names(given)
     found = adjust_with_camera(
-        visual_map, start, names, robust(settings), most_shift=s.most_shift, options=options(s.steps)
+        visual_map, start, names, robust(settings), most_shift_px=s.most_shift, options=options(s.steps)
     )
     camera = given if found.reason else without_lens_terms(given, found.camera, found.refused)
     if not found.reason:

@@ -127,9 +127,9 @@ class CameraSettings:
 
     refine: bool = assume(False, "", "the camera that was given is believed; the last adjustment may free it")
     most_shift: float = assume(
-        0.02,
-        "of the picture's width",
-        "an intrinsic whose standard deviation moves a pixel farther stays; what is given is seldom so wrong",
+        5.0,
+        "px",
+        "an intrinsic whose standard deviation moves a pixel farther stays; a dozen times the floor of sigma",
     )
     steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
 

@@ -95,7 +95,7 @@ def adjust_with_camera(
     names: tuple[str, ...],
     robust: Robust,
     *,
-    most_shift: float,
+    most_shift_px: float,
     options: Options | None = None,
 ) -> SelfCalibration:
     """Move everything but the first keyframe, and those intrinsics that the motion determines.
@@ -111,8 +111,8 @@ def adjust_with_camera(
     names : tuple of str
         Intrinsics that may be freed.
     robust : Robust
-    most_shift : float
-        An intrinsic is refused if one standard deviation of it moves a pixel farther; widths of the picture.
+    most_shift_px : float
+        An intrinsic is refused if one standard deviation of it moves some pixel farther.
     options : Options, optional
 
     Returns
@@ -121,7 +121,7 @@ def adjust_with_camera(
     """
     whole = as_problem(visual_map, camera=camera)
     height, width = visual_map.shape
-    found = self_calibrate(whole.problem, names, (width, height), robust, options, most_shift)
+    found = self_calibrate(whole.problem, names, (width, height), robust, options, most_shift_px)
     if not found.reason:
         visual_map.change_camera(found.camera)
         _put_back(visual_map, whole, found.result.problem.scene, found.result)
