@@ -73,6 +73,15 @@ def test_the_same_pictures_give_the_same_bytes(film: Film, desk: Run) -> None:
         assert a.tobytes() == b.tobytes()
 
 
+def test_every_step_tells_its_stages(desk: Run) -> None:
+    for outcome in desk.outcomes:
+        stages = outcome.stages
+        assert set(stages) <= set(ptam.STAGES)
+        assert min(stages.values()) >= 0
+        assert "fine" in stages or outcome.tracked is None
+        assert ("local" in stages) == (outcome.mapped is not None)
+
+
 def test_live_poses_are_those_that_were_told(desk: Run) -> None:
     for outcome in desk.outcomes:
         if outcome.tracked is not None and outcome.tracked.quality is not Quality.LOST:

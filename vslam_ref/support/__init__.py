@@ -10,5 +10,6 @@ module          holds
 ``provenance``  versions, git commit, platform
 ``pages``       HTML pages of reports; no numeric room imports it
 ``timing``      paired timing, for ratios that hold when the machine's speed drifts
+``stopwatch``   seconds by stage of a program
 ==============  ==========================================================================
 """

@@ -16,9 +16,9 @@ module              holds
 A system takes pictures; it opens no files and draws nothing.
 """
 
-from vslam_ref.systems.ptam.ptam import PictureOutcome, Pose, Ptam
+from vslam_ref.systems.ptam.ptam import STAGES, PictureOutcome, Pose, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
 
-__all__ = ["PictureOutcome", "Pose", "Ptam", "Quality", "Settings", "Tracked"]
+__all__ = ["STAGES", "PictureOutcome", "Pose", "Ptam", "Quality", "Settings", "Tracked"]

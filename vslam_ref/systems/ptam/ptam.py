@@ -10,7 +10,9 @@ In this order, one after the other, on one thread: the same pictures and seed gi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
+from vslam_ref.support.stopwatch import Stopwatch, stage
 from vslam_ref.systems.ptam import trails as trail_steps
 from vslam_ref.systems.ptam.look import prepare
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
@@ -30,6 +33,24 @@ from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked, Tracker
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
+
+STAGES = (
+    "prepare",
+    "start",
+    "guess",
+    "coarse",
+    "fine",
+    "pose",
+    "recover",
+    "look again",
+    "new points",
+    "neighbours",
+    "local",
+    "global",
+    "rest",
+)
+"""Of a step, in their order: pyramid and corners; before there is a map; guesses by the small image; both
+passes without their poses, and these; without a guess; then the mapper's, and what is left."""
 
 
 class Pose(NamedTuple):
@@ -53,12 +74,15 @@ class PictureOutcome(NamedTuple):
         If it became a keyframe.
     attempt : Attempt or str or None
         Of a start, if one was tried; a sentence where there was nothing to try.
+    stages : mapping of str to float
+        CPU time of the thread, seconds, by ``STAGES`` that had a part in it; together the whole step.
     """
 
     number: int
     tracked: Tracked | None = None
     mapped: MappedKeyframe | None = None
     attempt: Attempt | str | None = None
+    stages: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass
@@ -107,11 +131,16 @@ class Ptam:
         shape = np.shape(grey)
         if self.shape not in (None, shape):
             raise ValueError(f"picture {number} has shape {shape}: the ones before had {self.shape}")
-        picture = prepare(number, grey, self.settings.features)
-        self.shape = shape
-        if self.map is None:
-            return self._before_the_map(picture)
-        return self._with_the_map(picture)
+        with Stopwatch() as watch:
+            with stage("prepare"):
+                picture = prepare(number, grey, self.settings.features)
+            self.shape = shape
+            if self.map is None:
+                with stage("start"):
+                    outcome = self._before_the_map(picture)
+            else:
+                outcome = self._with_the_map(picture)
+        return outcome._replace(stages=watch.seconds)
 
     # --- before there is a map ----------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.bundle import Options, Robust
 from vslam_ref.estimation.robust import tuned
+from vslam_ref.support.stopwatch import stage
 from vslam_ref.systems.ptam.mapper.associate import look_again, look_in_neighbours, seldom_found
 from vslam_ref.systems.ptam.mapper.new_points import new_points
 from vslam_ref.systems.ptam.settings import Settings
@@ -62,13 +63,18 @@ def map_keyframe(
     held = visual_map.alive[seen.point]
     visual_map.observe(kf, seen.point[held], seen.level[held], seen.uv[held])
     alive = np.flatnonzero(visual_map.alive)
-    again = look_again(visual_map, kf, picture, alive, s.look_radius, f.looks)
-    fresh = new_points(visual_map, kf, picture, s, f)
-    around = neighbours(visual_map, kf, s.neighbours)
-    elsewhere = look_in_neighbours(visual_map, around, fresh, s.look_radius, f.looks)
-    adjusted = [adjust_local(visual_map, kf, settings)]
+    with stage("look again"):
+        again = look_again(visual_map, kf, picture, alive, s.look_radius, f.looks)
+    with stage("new points"):
+        fresh = new_points(visual_map, kf, picture, s, f)
+    with stage("neighbours"):
+        around = neighbours(visual_map, kf, s.neighbours)
+        elsewhere = look_in_neighbours(visual_map, around, fresh, s.look_radius, f.looks)
+    with stage("local"):
+        adjusted = [adjust_local(visual_map, kf, settings)]
     if kf % s.global_every == 0:
-        adjusted.append(adjust_all(visual_map, settings, s.global_steps))
+        with stage("global"):
+            adjusted.append(adjust_all(visual_map, settings, s.global_steps))
     bad = seldom_found(visual_map, s.tries, s.found)
     visual_map.remove(bad)
     return MappedKeyframe(kf, len(again), len(fresh), elsewhere, tuple(adjusted), len(bad))

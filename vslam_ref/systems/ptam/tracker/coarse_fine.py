@@ -10,6 +10,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.estimation.pose_tracking import TrackedPose, track_pose
 from vslam_ref.estimation.robust import tuned
 from vslam_ref.features import level_sigma
+from vslam_ref.support.stopwatch import stage
 from vslam_ref.systems.ptam.settings import TrackerSettings
 from vslam_ref.systems.visual_map import Looks, PreparedPicture, Visible, VisualMap, look, visible
 
@@ -99,16 +100,17 @@ def _pass(
 ) -> Pass:
     measured = look(visual_map, seen, picture, radius, looks)
     rows = np.flatnonzero(measured.ok)
-    pose = track_pose(
-        visual_map.camera,
-        visual_map.X_world[seen.point[rows]],
-        measured.uv[rows],
-        T_guess,
-        sigma_px=level_sigma(seen.level[rows]),
-        loss=tuned(settings.loss, 2),
-        steps=settings.steps,
-        least_sigma=settings.least_sigma,
-    )
+    with stage("pose"):
+        pose = track_pose(
+            visual_map.camera,
+            visual_map.X_world[seen.point[rows]],
+            measured.uv[rows],
+            T_guess,
+            sigma_px=level_sigma(seen.level[rows]),
+            loss=tuned(settings.loss, 2),
+            steps=settings.steps,
+            least_sigma=settings.least_sigma,
+        )
     weights = np.zeros(len(seen.point))
     weights[rows] = pose.weights
     return Pass(seen, measured.uv, measured.ok, weights, pose)

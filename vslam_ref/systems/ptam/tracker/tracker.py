@@ -13,6 +13,7 @@ from vslam_ref.estimation.pose_tracking import TrackedPose
 from vslam_ref.features import plane_motion, rotation
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
+from vslam_ref.support.stopwatch import stage
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker import recover
 from vslam_ref.systems.ptam.tracker.coarse_fine import Pass, coarse, fine
@@ -64,7 +65,8 @@ class Tracker:
         """
         found = self._predicted(visual_map, picture) if self.lost == 0 else None
         if (found is None or found.quality is Quality.LOST) and self.settings.tracker.follow:
-            found = self._recovered(visual_map, picture) or found
+            with stage("recover"):
+                found = self._recovered(visual_map, picture) or found
         if found is None:
             found = self._nothing()
         self._remember(picture, found)
@@ -81,7 +83,10 @@ class Tracker:
         s = self.settings.tracker
         best: tuple[int, Array, str] | None = None
         for way, T_guess, radius in self._guesses(visual_map, picture):
-            first = coarse(visual_map, picture, T_guess, radius, s, self.settings.features.looks, self.rng)
+            with stage("coarse"):
+                first = coarse(
+                    visual_map, picture, T_guess, radius, s, self.settings.features.looks, self.rng
+                )
             if best is None or first.inliers > best[0]:
                 best = first.inliers, first.pose.T_cam_world, way
             agree = first.inliers / max(len(first.seen.point), 1)
@@ -95,7 +100,8 @@ class Tracker:
         self, visual_map: VisualMap, picture: PreparedPicture, T: Array, radius: float, way: str
     ) -> Tracked:
         s = self.settings.tracker
-        second = fine(visual_map, picture, T, radius, s, self.settings.features.looks, self.rng)
+        with stage("fine"):
+            second = fine(visual_map, picture, T, radius, s, self.settings.features.looks, self.rng)
         return Tracked(second.pose.T_cam_world, quality(second, s), second, way)
 
     def _guesses(self, visual_map: VisualMap, picture: PreparedPicture) -> Iterator[tuple[str, Array, float]]:
@@ -104,15 +110,19 @@ class Tracker:
         yield "velocity", self.motion.predict(self.T_last), radius[0]
         if self.last is None:
             return
-        moved = plane_motion(self.last.small, picture.small)
-        if moved.reason:
-            turned = self.T_last
-        else:
-            shape = self.last.small.value.shape
-            R = rotation(visual_map.camera, (shape[0], shape[1]), picture.small.level, moved.T_b_a)
-            turned = se3.compose(se3.from_rt(R, np.zeros(3)), self.T_last)
+        with stage("guess"):
+            turned = self._turned(visual_map, picture, self.last)
         yield "small image", turned, radius[1]
         yield "wide", turned, radius[2]
+
+    def _turned(self, visual_map: VisualMap, picture: PreparedPicture, last: PreparedPicture) -> Array:
+        """Return the last pose, turned as the small images say."""
+        moved = plane_motion(last.small, picture.small)
+        if moved.reason:
+            return self.T_last
+        shape = last.small.value.shape
+        R = rotation(visual_map.camera, (shape[0], shape[1]), picture.small.level, moved.T_b_a)
+        return se3.compose(se3.from_rt(R, np.zeros(3)), self.T_last)
 
     def _recovered(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked | None:
         """Follow patches from the last picture that was tracked, else from the keyframes most alike."""
