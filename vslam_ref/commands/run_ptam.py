@@ -43,7 +43,15 @@ largest and RMS over the picture. Run again with '--camera DIR/camera.yaml' to u
 
 Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
 A scene that allows no start ends with status 0 and the reason.
-'--set tracker.fine_points=500' changes a setting."""
+'--set tracker.fine_points=500' changes a setting. '--set preset=NAME' changes several; others given beside it
+win:
+  ptam2007        the constants and rules of PTAM as it was published
+  no_warp         a patch is compared as it was first seen, on the level that fits its size
+  least_squares   the tracker and every adjustment minimise squares instead of Tukey's loss
+  absolute_score  a patch must be alike by an absolute limit, not by a share of its own contrast
+  no_search_back  a match on the epipolar curve is not searched back into its source
+  corners_only    patches are looked for at corners only, not first where they are expected
+  no_following    a lost camera is found again by keyframes only, not by following the last patches"""
 EXAMPLES = """\
 examples, after 'vslam-ref sample video --out samples':
   vslam-ref run ptam samples/video --out out/desk
@@ -95,11 +103,10 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.experiments.ptam import numbers, report
     from vslam_ref.experiments.ptam.interrupting import interrupts
     from vslam_ref.support import files
-    from vslam_ref.support.config import apply_overrides
-    from vslam_ref.systems.ptam.settings import Settings
+    from vslam_ref.systems.ptam.presets import settings_from
 
     assert out is not None  # --out is required
-    settings = apply_overrides(Settings(), [*options.set, *(["camera.refine=true"] * options.refine_camera)])
+    settings = settings_from([*options.set, *(["camera.refine=true"] * options.refine_camera)])
     sequence = open_source(options)
     warm("features", "patches", "pose", "bundle", "bundle_schur")
     with files.new_folder(out) as folder, interrupts() as interrupted:

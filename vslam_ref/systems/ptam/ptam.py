@@ -183,7 +183,8 @@ class Ptam:
         self.trails = None
 
     def _tracker(self, T_last: Array) -> Tracker:
-        return Tracker(self.settings, self.rng, DecayingVelocity(np.zeros(6), 1.0, 1.0), T_last)
+        s = self.settings.tracker
+        return Tracker(self.settings, self.rng, DecayingVelocity(np.zeros(6), s.decay, s.newest), T_last)
 
     # --- with a map ---------------------------------------------------------------------------
 
