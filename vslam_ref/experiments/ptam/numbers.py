@@ -18,6 +18,7 @@ from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.metrics.trajectory import Trajectory, absolute_error
 from vslam_ref.support.config import assumptions
 from vslam_ref.support.provenance import versions
+from vslam_ref.systems.ptam import STAGES
 from vslam_ref.systems.ptam.settings import Settings
 
 ROWS = (
@@ -113,6 +114,7 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
         "camera_shift_px": None if system.refined is None else system.refined.shift._asdict(),
         "camera": camera_numbers(run),
         "fps": _rate(frames),
+        "picture_ms": picture_ms(run),
         "stage_ms": stage_ms(run),
         "seconds": seconds,
         "interrupted": run.interrupted,
@@ -131,8 +133,14 @@ def _rate(frames: list[Frame]) -> float | None:
     return len(times) / sum(times) if times else None
 
 
-def stage_ms(run: Run) -> dict[str, float | None]:
-    """Median milliseconds of a picture of each kind, and of the last adjustment."""
+def stage_ms(run: Run) -> dict[str, float]:
+    """Median milliseconds of each stage over the pictures in which it had a part, of the processor."""
+    times = {name: [f.stages[name] for f in run.frames if name in f.stages] for name in STAGES}
+    return {name: 1e3 * float(np.median(seconds)) for name, seconds in times.items() if seconds}
+
+
+def picture_ms(run: Run) -> dict[str, float | None]:
+    """Median milliseconds of a picture of each kind, and of the last adjustment, by the clock on the wall."""
     kinds: Mapping[str, list[float]] = {
         "before_start": [f.seconds for f in run.frames if f.state == WAITING],
         "start": [f.seconds for f in run.frames if f.state == START],
@@ -182,10 +190,9 @@ def notes(run: Run, final: Accuracy) -> list[str]:
 def number_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the table of numbers; what is not known is left out."""
     rows = [[words, _show(content[key]), unit] for key, words, unit in ROWS if content[key] is not None]
-    stages = content["stage_ms"].items()
-    return rows + [
-        [f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in stages if v is not None
-    ]
+    kinds = content["picture_ms"].items()
+    rows += [[f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in kinds if v is not None]
+    return rows + [[f"stage: {name}", _show(v), "ms of CPU"] for name, v in content["stage_ms"].items()]
 
 
 def _show(value: Any) -> str:
