@@ -116,7 +116,8 @@ def test_opencv_headers_of_all_versions(tmp_path: Path, header: str) -> None:
 )
 def test_writing_and_reading_gives_the_same_bits(tmp_path: Path, camera: Camera) -> None:
     path = tmp_path / "camera.yaml"
-    file = CameraFile(camera, (640, 480), name='left "one": #1')
+    std = tuple(0.1 * k for k in range(len(camera.params)))
+    file = CameraFile(camera, (640, 480), name='left "one": #1', std=std)
     write_opencv(path, file)
     assert read_opencv(path) == file
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
@@ -176,6 +177,8 @@ def test_ros_and_named_models(tmp_path: Path) -> None:
         ("   data: [ 5.35e+02", "   data: [ [5.35e+02]", r"is a list; expected one word"),
         ("[ -2.66e-01", "[ -2.66e-01, 0.1", "distortion_coefficients has 6 numbers; expected 5 x 1"),
         ("   rows: 5", "   rows: 5\n  bad", "expected YAML"),
+        ("---\n", "---\nstandard_deviations: 3\n", ":3: standard_deviations"),
+        ("---\n", "---\nstandard_deviations: { rows: 1, cols: 1, data: [1.] }\n", "expected 9 numbers"),
         ("---\n", "---\ncamera_model: magic\n", ":3: camera_model is 'magic'; expected one of pinhole"),
         ("---\n", "---\ncamera_model: rational\n", "5 coefficients for rational; expected 8"),
     ],

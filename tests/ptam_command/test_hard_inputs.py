@@ -85,7 +85,7 @@ def test_no_start_is_told_with_its_reason(
     assert f"note: no start: {reason}" in capsys.readouterr().out
     assert reason in (tmp_path / "out" / "report.html").read_text()
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"result.json", "report.html", "course.png", "overlay.webm"}
+    assert names == {"result.json", "report.html", "course.png", "stages.png", "overlay.webm"}
 
 
 @pytest.mark.parametrize(("number", "films"), [(2, 3), (4, 5)], ids=["third", "last"])

@@ -19,6 +19,7 @@ from vslam_ref import _kernels
 from vslam_ref.datasets import trajectories
 from vslam_ref.experiments.ptam import running
 from vslam_ref.metrics.trajectory import evaluate
+from vslam_ref.systems.ptam import STAGES
 
 KEYS = {
     *("frames", "started_at", "tracked", "lost", "relocalised", "keyframes", "points", "seconds", "fps"),
@@ -26,7 +27,7 @@ KEYS = {
 }
 FILES = {
     *("result.json", "report.html", "trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply"),
-    *("overlay.webm", "map.png", "course.png"),
+    *("overlay.webm", "map.png", "course.png", "stages.png"),
 }
 
 
@@ -44,7 +45,9 @@ def test_a_run_leaves_every_file_and_number(ran: Any) -> None:
         "mapper.new_points": {"value": 120, "default": 400},
     }
     assert n["no_start"] is None
-    assert set(n["stage_ms"]) >= {"tracking", "tracking_and_keyframe"}
+    assert set(n["picture_ms"]) >= {"tracking", "tracking_and_keyframe"}
+    assert set(n["stage_ms"]) >= {"prepare", "start", "coarse", "fine", "pose"}
+    assert set(n["stage_ms"]) <= set(STAGES)
 
 
 def test_the_path_is_the_true_one_up_to_a_similarity(ran: Any) -> None:
@@ -92,7 +95,7 @@ def test_the_film_has_every_picture_and_the_page_shows_it(ran: Any) -> None:
     assert "http" not in page
     assert "<script" not in page
     assert '<video src="overlay.webm" controls' in page
-    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/png;base64,") == 3
     assert "tracker.fine_points" in page
     assert "cost of a point" in page
     assert "points lie on it" in page

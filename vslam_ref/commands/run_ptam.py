@@ -37,9 +37,21 @@ and the live path after alignment by a similarity (null without truth); scale_dr
 last third of the path to the truth over that of the first (below 1: the map grew); pictures a second without
 reading and drawing.
 
+--refine-camera: what the motion does not determine keeps its value, and is named with its standard deviation
+(sigma). camera_shift_px: how far from its place the refined camera shows what the given one sees in a pixel,
+largest and RMS over the picture. Run again with '--camera DIR/camera.yaml' to use the camera from the start.
+
 Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
 A scene that allows no start ends with status 0 and the reason.
-'--set tracker.fine_points=500' changes a setting."""
+'--set tracker.fine_points=500' changes a setting. '--set preset=NAME' changes several; others given beside it
+win:
+  ptam2007        the constants and rules of PTAM as it was published
+  no_warp         a patch is compared as it was first seen, on the level that fits its size
+  least_squares   the tracker and every adjustment minimise squares instead of Tukey's loss
+  absolute_score  a patch must be alike by an absolute limit, not by a share of its own contrast
+  no_search_back  a match on the epipolar curve is not searched back into its source
+  corners_only    patches are looked for at corners only, not first where they are expected
+  no_following    a lost camera is found again by keyframes only, not by following the last patches"""
 EXAMPLES = """\
 examples, after 'vslam-ref sample video --out samples':
   vslam-ref run ptam samples/video --out out/desk
@@ -51,8 +63,11 @@ with your own pictures:
   vslam-ref run ptam pictures/ --camera camera.yaml --rate 10 --truth groundtruth.txt --out out/pictures
 and with known data sets:
   vslam-ref run ptam new_tsukuba_150 --out out/tsukuba --json tsukuba.json
+  vslam-ref run ptam kitti07_head --refine-camera --out out/kitti
+  vslam-ref run ptam kitti07_head --camera out/kitti/camera.yaml --out out/kitti2
   vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
 VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
+REFINE = "free the camera in the last adjustment, as far as the motion determines it; writes camera.yaml"
 INTERRUPTED = 128 + signal.SIGINT
 
 
@@ -69,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--every", type=at_least(1), default=1, metavar="K", help="only every K-th picture (default: 1)"
     )
     parser.add_argument("--truth", metavar="FILE", help="true path (TUM, KITTI or EuRoC format)")
+    parser.add_argument("--refine-camera", action="store_true", help=REFINE)
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--times", metavar="FILE", help="one time a line, seconds")
     clock.add_argument("--rate", type=float, metavar="HZ", help="pictures a second, where no times are known")
@@ -87,11 +103,10 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.experiments.ptam import numbers, report
     from vslam_ref.experiments.ptam.interrupting import interrupts
     from vslam_ref.support import files
-    from vslam_ref.support.config import apply_overrides
-    from vslam_ref.systems.ptam.settings import Settings
+    from vslam_ref.systems.ptam.presets import settings_from
 
     assert out is not None  # --out is required
-    settings = apply_overrides(Settings(), options.set)
+    settings = settings_from([*options.set, *(["camera.refine=true"] * options.refine_camera)])
     sequence = open_source(options)
     warm("features", "patches", "pose", "bundle", "bundle_schur")
     with files.new_folder(out) as folder, interrupts() as interrupted:

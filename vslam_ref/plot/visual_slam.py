@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,11 @@ AXES = "xyz"
 KEPT = (2.0, 98.0)
 """Percentiles of the points that the picture's frame must hold: a few lie far off."""
 MARGIN = 0.06
+COLOURS = (
+    *(style.GREY, style.SKY, style.BLUE, style.GREEN, style.ORANGE, style.VERMILION, style.PURPLE),
+    style.YELLOW,
+)
+"""Of stages that stand upon each other."""
 
 
 class MapDrawing(NamedTuple):
@@ -190,3 +195,47 @@ def pictures_figure(images: Sequence[NDArray[np.uint8]], titles: Sequence[str]) 
             panel.grid(False)
             panel.set_title(title, fontsize=9)
     return figure
+
+
+class StagesDrawing(NamedTuple):
+    """Time of every stage, one entry a picture.
+
+    Attributes
+    ----------
+    number : ndarray, shape (n,)
+        Of the picture.
+    tracking, mapping : mapping of str to ndarray, shape (n,)
+        Milliseconds of each stage: of every picture, and of those that become keyframes; 0 where it had no
+        part.
+    """
+
+    number: NDArray[np.int64]
+    tracking: Mapping[str, Array]
+    mapping: Mapping[str, Array]
+
+
+def stages_figure(stages: StagesDrawing, title: str) -> Figure:
+    """Draw the time of tracking and of mapping over the pictures, stage upon stage."""
+    with style.house_style():
+        figure = Figure(figsize=(style.WIDTH, 5.4), dpi=style.DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, sharex=True)
+        for panel, times, words in ((above, stages.tracking, "tracking"), (below, stages.mapping, "mapping")):
+            _stack(panel, stages.number, times)
+            panel.set_ylabel(f"{words} [ms of CPU]")
+        below.set_xlabel("number of the picture")
+        figure.suptitle(title, fontsize=12)
+    return figure
+
+
+def _stack(panel: Axes, number: NDArray[np.int64], times: Mapping[str, Array]) -> None:
+    """Bars without gaps, one stage upon the other; the few longest pictures may reach beyond the panel."""
+    base = np.zeros(len(number))
+    width = float(np.diff(number).min()) if len(number) > 1 else 1.0
+    for colour, (name, ms) in zip(COLOURS, times.items(), strict=False):
+        panel.bar(number, ms, width, bottom=base, color=colour, lw=0, label=name)
+        base = base + ms
+    some = base[base > 0]
+    panel.set_ylim(0, 1.35 * float(np.percentile(some, 99)) if len(some) else 1.0)
+    if times:
+        panel.legend(loc="upper right", frameon=False, ncols=4)

@@ -7,6 +7,7 @@ OpenCV has no rule for names; those of its samples, of ROS and of this package a
     distortion_coefficients   k1 k2 p1 p2 [k3 [k4 k5 k6]], or k1 k2 k3 k4 of a fisheye
     image_width, image_height
     camera_model              pinhole | radtan | rational | fisheye | fov  (or distortion_model)
+    standard_deviations       of fx, fy, cx, cy and the coefficients; 0: not estimated (this package's)
 
 OpenCV's pixel (0, 0) is the centre of the top-left pixel, as ours.
 """
@@ -26,6 +27,7 @@ from vslam_ref.support.files import write_bytes
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "M")
 DISTORTION = ("distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "D1")
 WIDTH, HEIGHT = ("image_width", "image_Width"), ("image_height", "image_Height")
+STD = "standard_deviations"
 SYNONYMS = {
     "plumb_bob": "radtan",
     "radial-tangential": "radtan",
@@ -66,7 +68,16 @@ def read_opencv(
     name = model or _named_model(entries) or _model_of(coefficients)
     camera = _camera(at, name, sensor, coefficients)
     title = entries["camera_name"].text() if "camera_name" in entries else ""
-    return CameraFile(camera, _size(entries), name=title)
+    std = _std(entries[STD], len(camera.params)) if STD in entries else None
+    return CameraFile(camera, _size(entries), name=title, std=std)
+
+
+def _std(node: Node, count: int) -> tuple[float, ...]:
+    """Standard deviations of the parameters."""
+    values = node.matrix().ravel()
+    if len(values) != count or not (values >= 0).all():
+        raise node.error(f"{node.name}: expected {count} numbers, none below 0")
+    return tuple(values.tolist())
 
 
 def _sensor(node: Node) -> Array:
@@ -143,6 +154,8 @@ def write_opencv(path: Path | str, file: CameraFile) -> None:
     lines += _matrix_lines("camera_matrix", camera.matrix)
     if len(camera.params) > 4:
         lines += _matrix_lines("distortion_coefficients", camera.params[4:, None])
+    if file.std is not None:
+        lines += _matrix_lines(STD, np.array(file.std)[:, None])
     write_bytes(Path(path), ("\n".join(lines) + "\n").encode())
 
 

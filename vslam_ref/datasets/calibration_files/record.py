@@ -23,12 +23,16 @@ class CameraFile:
         Rigid motion from the rig (EuRoC's body, Kalibr's IMU) to the camera, metres; None where not given.
     name : str
         The camera's name in the file.
+    std : tuple of float, or None
+        Standard deviation of each of the camera's ``params``, 0 for what was not estimated; None where the
+        file does not say.
     """
 
     camera: Camera
     size: tuple[int, int] | None = None
     T_cam_rig: Array | None = None
     name: str = ""
+    std: tuple[float, ...] | None = None
 
 
 def pixels_from_relative(relative: float, size: int, *, centre: bool) -> float:

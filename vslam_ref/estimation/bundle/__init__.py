@@ -21,7 +21,10 @@ module                holds
 ``local``             the newest views and their neighbours only
 ``outliers``          wrong observations found and taken out
 ``gauge``             the seven coordinates that no image shows
+``undamped``          the normal equations at a solution
 ``covariance``        of chosen poses and points
+``lens_covariance``   of the intrinsics that all views share
+``self_calibration``  the intrinsics freed, as far as the views determine them
 ====================  ============================================================================
 """
 

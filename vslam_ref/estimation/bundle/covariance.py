@@ -26,14 +26,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.estimation.bundle import reduced_system, schur
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.bundle.gauge import fix_gauge, gauge_directions
-from vslam_ref.estimation.bundle.normal import Normal, normal_equations, sum_by_point
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.structure import Structure, structure
-from vslam_ref.estimation.bundle.weights import whitened
+from vslam_ref.estimation.bundle.undamped import Blocks, UndampedSystem
 
 Gauge = Literal["fixed", "free"]
 
@@ -110,11 +108,9 @@ def covariance(
             raise ValueError("gauge='free': the problem holds a view or a point; say gauge='fixed'")
         problem = fix_gauge(problem)
     table = structure(problem)
-    system = _System.at(problem, result, table)
-    dof = 2 * int(np.count_nonzero(result.weights)) - table.size - 3 * int(system.measured.sum())
-    if sigma is None:
-        sigma = math.sqrt(system.square / dof) if dof > 0 else math.inf
-    reason = _open(system, chosen, dof, sigma)
+    system = UndampedSystem.at(problem, result, table)
+    sigma = system.sigma if sigma is None else sigma
+    reason = _open(system, chosen, sigma)
     if reason:
         return BundleCovariance(None, None, None, sigma, reason)
     rows = chosen.of(system.solve(*chosen.units(table)), table)
@@ -123,55 +119,6 @@ def covariance(
     view = np.array([matrix[a : a + 6, a : a + 6] for a in range(0, k, 6)]).reshape(-1, 6, 6)
     point = np.array([matrix[a : a + 3, a : a + 3] for a in range(k, len(matrix), 3)]).reshape(-1, 3, 3)
     return BundleCovariance(matrix, view, point, sigma, "")
-
-
-class _Blocks(NamedTuple):
-    """Columns over all unknowns: views' coordinates and a waste row (D + 1, k), sorted points (N, 3, k)."""
-
-    view: Array
-    point: Array
-
-
-class _System(NamedTuple):
-    """Factored normal equations at a solution, without damping."""
-
-    normal: Normal
-    table: Structure
-    M: Array
-    factor: reduced_system.Factor | None
-    square: float
-
-    @classmethod
-    def at(cls, problem: BundleProblem, result: BundleResult, table: Structure) -> _System:
-        """Linearise and eliminate the points."""
-        state, weights = table.state(problem), result.weights[table.order]
-        normal = normal_equations(problem.model, state, table, weights, problem.free.intrinsics)
-        M = schur.point_factor(normal.C, np.zeros((len(normal.C), 3)), table.free_point)
-        S, _ = schur.reduce(normal, M, np.zeros(table.size), table)
-        # columns of length 1, so that metres and radians are judged alike
-        scale = np.sqrt(np.where(np.diag(S) > 0, np.diag(S), 1.0))
-        regular = _is_regular(S / np.outer(scale, scale))
-        factor = reduced_system.factor(S, table.border, table.bandwidth, "dense") if regular else None
-        errors = whitened(problem.seen.cov_uv, result.residual)
-        square = float(np.einsum("n,ni,ni->", result.weights, errors, errors))
-        return cls(normal, table, M, factor, square)
-
-    @property
-    def measured(self) -> BoolArray:
-        """Points (N,) that their observations determine."""
-        return np.asarray(self.M[:, 0, 0] > 0)
-
-    def solve(self, view: Array, point: Array) -> _Blocks:
-        """Inverse normal matrix times some columns, by elimination of the points: the chapter's two rows."""
-        assert self.factor is not None
-        table, W, M_T = self.table, self.normal.W, np.swapaxes(self.M, 1, 2)
-        view, at = view.copy(), table.columns[table.links.view]
-        seen = np.matmul(W, (self.M @ (M_T @ point))[table.links.point])
-        np.subtract.at(view, at.ravel(), seen.reshape(-1, view.shape[1]))
-        x = np.vstack([self.factor.solve(view[:-1]), np.zeros((1, view.shape[1]))])
-        back = np.matmul(np.swapaxes(W, 1, 2), x[at]).reshape(len(W), -1)
-        pulled = sum_by_point(back, table.offsets).reshape(point.shape)
-        return _Blocks(x, self.M @ (M_T @ (point - pulled)))
 
 
 class _Chosen(NamedTuple):
@@ -185,7 +132,7 @@ class _Chosen(NamedTuple):
         """Columns of the views' coordinates, and numbers of the sorted points."""
         return table.columns[self.views][:, :6].ravel(), np.argsort(table.point_order)[self.points]
 
-    def units(self, table: Structure) -> _Blocks:
+    def units(self, table: Structure) -> Blocks:
         """Unit vectors of the chosen coordinates; zero for what is fixed."""
         columns, points = self.places(table)
         k, count = len(columns), len(columns) + 3 * len(points)
@@ -194,29 +141,18 @@ class _Chosen(NamedTuple):
         view[table.size] = 0.0
         for axis in range(3):
             point[points, axis, k + axis + 3 * np.arange(len(points))] = 1.0
-        return _Blocks(view, point)
+        return Blocks(view, point)
 
-    def of(self, blocks: _Blocks, table: Structure) -> Array:
+    def of(self, blocks: Blocks, table: Structure) -> Array:
         """Rows of the chosen coordinates, (6 k + 3 m, columns)."""
         columns, points = self.places(table)
         return np.concatenate([blocks.view[columns], blocks.point[points].reshape(-1, blocks.view.shape[1])])
 
 
-def _is_regular(S: Array) -> bool:
-    """Whether the smallest squared pivot of the scaled matrix is above its rounding."""
-    from scipy.linalg import LinAlgError, cholesky
-
-    try:
-        pivots = np.diag(cholesky(S, lower=True, check_finite=False)) ** 2
-    except LinAlgError:
-        return False
-    return bool(pivots.min(initial=1.0) > 100 * len(S) * schur.EPS)
-
-
-def _open(system: _System, chosen: _Chosen, dof: int, sigma: float) -> str:
+def _open(system: UndampedSystem, chosen: _Chosen, sigma: float) -> str:
     """Why there is no covariance, or nothing."""
     if math.isinf(sigma):
-        return f"{dof} redundant measurements: the noise is unknown; say sigma"
+        return f"{system.redundancy} redundant measurements: the noise is unknown; say sigma"
     if system.factor is None:
         return "the normal matrix is singular: the gauge is free (fix it, or ask for it), or a view is loose"
     _, points = chosen.places(system.table)
@@ -226,7 +162,7 @@ def _open(system: _System, chosen: _Chosen, dof: int, sigma: float) -> str:
     return ""
 
 
-def _projected(rows: Array, chosen: _Chosen, system: _System) -> Array:
+def _projected(rows: Array, chosen: _Chosen, system: UndampedSystem) -> Array:
     """From the covariance with one gauge to that of the free one: P Sigma P with P = I - G G^T.
 
     Implements :eq:`eq-free-covariance`.

@@ -11,16 +11,16 @@ import numpy as np
 from vslam_ref import _kernels
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Sequence
+from vslam_ref.experiments.ptam.camera import camera_notes, camera_numbers
+from vslam_ref.experiments.ptam.paths import LEAST_THIRD, scale_drift, trajectory
 from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, START, UNUSABLE, WAITING, Frame, Run, path
-from vslam_ref.geometry import se3
 from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.metrics.trajectory import Trajectory, absolute_error
 from vslam_ref.support.config import assumptions
 from vslam_ref.support.provenance import versions
+from vslam_ref.systems.ptam import STAGES
 from vslam_ref.systems.ptam.settings import Settings
 
-LEAST_THIRD = 3
-"""Pairs of poses in a third of the path, that its scale may be measured."""
 ROWS = (
     ("frames", "pictures", ""),
     ("unusable", "pictures that could not be used", ""),
@@ -34,6 +34,7 @@ ROWS = (
     ("ate_percent", "the same, of the true path's length", "%"),
     ("ate_live_rmse", "ATE of the live path", "truth's unit"),
     ("scale_drift", "scale of the last third over that of the first", ""),
+    ("camera_shift_px", "shift of a pixel by the refined camera: largest, RMS", "px"),
     ("fps", "pictures a second, tracking and mapping", "1/s"),
     ("seconds", "time of the run, with reading and drawing", "s"),
 )
@@ -83,33 +84,8 @@ def accuracy(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> Accur
         return nothing._replace(reason=str(error))
     length = float(np.linalg.norm(np.diff(truth.t_world_body, axis=0), axis=1).sum())
     percent = 100 * found.stats.rmse / length if length > 0 else None
-    drift = _drift(estimate, truth)
+    drift = scale_drift(estimate, truth)
     return Accuracy(found.stats.rmse, percent, drift, found.alignment, truth.t_world_body, "")
-
-
-def _drift(estimate: Trajectory, truth: Trajectory) -> float | None:
-    """Scale of the last third over that of the first; None where one is not known."""
-    third = len(truth) // 3
-    if third < LEAST_THIRD:
-        return None
-    scale = []
-    for rows in (np.arange(third), np.arange(len(truth) - third, len(truth))):
-        try:
-            scale.append(absolute_error(estimate.take(rows), truth.take(rows), "sim3").alignment.scale)
-        except ValueError:
-            return None
-    return scale[1] / scale[0]
-
-
-def trajectory(times: Array | None, T_cam_world: Array) -> Trajectory:
-    """Poses ``T_cam_world`` (n, 4, 4) as a trajectory of the camera in the world, in the order of time."""
-    T = se3.inverse(T_cam_world)
-    path = Trajectory(None, T[:, :3, 3], T[:, :3, :3])
-    if times is None:
-        return path
-    order = np.argsort(times, kind="stable")  # stamps may fall
-    sorted_path = path.take(order)
-    return Trajectory(times[order], sorted_path.t_world_body, sorted_path.R_world_body)
 
 
 def document(run: Run, seconds: float) -> dict[str, Any]:
@@ -135,7 +111,10 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
         "ate_percent": final.percent,
         "ate_live_rmse": live.rmse,
         "scale_drift": final.drift,
+        "camera_shift_px": None if system.refined is None else system.refined.shift._asdict(),
+        "camera": camera_numbers(run),
         "fps": _rate(frames),
+        "picture_ms": picture_ms(run),
         "stage_ms": stage_ms(run),
         "seconds": seconds,
         "interrupted": run.interrupted,
@@ -154,8 +133,14 @@ def _rate(frames: list[Frame]) -> float | None:
     return len(times) / sum(times) if times else None
 
 
-def stage_ms(run: Run) -> dict[str, float | None]:
-    """Median milliseconds of a picture of each kind, and of the last adjustment."""
+def stage_ms(run: Run) -> dict[str, float]:
+    """Median milliseconds of each stage over the pictures in which it had a part, of the processor."""
+    times = {name: [f.stages[name] for f in run.frames if name in f.stages] for name in STAGES}
+    return {name: 1e3 * float(np.median(seconds)) for name, seconds in times.items() if seconds}
+
+
+def picture_ms(run: Run) -> dict[str, float | None]:
+    """Median milliseconds of a picture of each kind, and of the last adjustment, by the clock on the wall."""
     kinds: Mapping[str, list[float]] = {
         "before_start": [f.seconds for f in run.frames if f.state == WAITING],
         "start": [f.seconds for f in run.frames if f.state == START],
@@ -199,19 +184,20 @@ def notes(run: Run, final: Accuracy) -> list[str]:
         told.append(f"no start: {reason}")
     elif final.reason:
         told.append(f"no error against the truth: {final.reason}")
-    return told
+    return told + camera_notes(run)
 
 
 def number_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the table of numbers; what is not known is left out."""
     rows = [[words, _show(content[key]), unit] for key, words, unit in ROWS if content[key] is not None]
-    stages = content["stage_ms"].items()
-    return rows + [
-        [f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in stages if v is not None
-    ]
+    kinds = content["picture_ms"].items()
+    rows += [[f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in kinds if v is not None]
+    return rows + [[f"stage: {name}", _show(v), "ms of CPU"] for name, v in content["stage_ms"].items()]
 
 
 def _show(value: Any) -> str:
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
     if isinstance(value, tuple | list):
-        return ", ".join(map(str, value))
+        return ", ".join(map(_show, value))
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -130,7 +130,7 @@ def picture(run: Run, frame: Frame, T_cam_world: Array | None, stage: Stage | No
     if source.grey is None:
         return np.full((height, width, 3), ABSENT, np.uint8)
     image = np.repeat(source.grey[..., None], 3, -1) if source.colour is None else source.colour.copy()
-    camera = run.sequence.camera
+    camera = None if run.system.map is None else run.system.map.camera  # as it was refined
     if T_cam_world is not None and stage is not None and camera is not None:
         draw_stage(image, view_of(camera, (width, height), T_cam_world, stage), stage.cell, unit)
     draw_marks(image, frame, unit)

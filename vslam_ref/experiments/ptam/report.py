@@ -7,9 +7,11 @@
     OUT/trajectory_live.txt       TUM: the poses as they were told when the pictures came
     OUT/keyframes.txt             TUM: the keyframes
     OUT/map.ply                   points in the grey of their pictures, keyframes as pyramids
+    OUT/camera.yaml               with --refine-camera: the camera, with standard deviations
     OUT/overlay.webm              the pictures with what was tracked, a grid on the plane, a house on it
     OUT/map.png                   the map and the path from three sides
     OUT/course.png                tracking over the pictures
+    OUT/stages.png                time per stage over the pictures
     OUT/report.html               the page
 
 Without a start there are no paths and no map.  Poses are ``T_world_cam``; the world is the camera's frame at
@@ -29,20 +31,36 @@ from vslam_ref.arrays import Array
 from vslam_ref.datasets import trajectories
 from vslam_ref.datasets.bundle_files.ply import write_ply
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows, trajectory
+from vslam_ref.datasets.calibration_files import write_opencv
+from vslam_ref.experiments.ptam.camera import camera_file, camera_rows
+from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows
 from vslam_ref.experiments.ptam.overlay import find_plane
+from vslam_ref.experiments.ptam.paths import trajectory
 from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, WAITING, Run, path
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot.saving import figure_bytes
-from vslam_ref.plot.visual_slam import CourseDrawing, MapDrawing, course_figure, map_figure
+from vslam_ref.plot.visual_slam import (
+    CourseDrawing,
+    MapDrawing,
+    StagesDrawing,
+    course_figure,
+    map_figure,
+    stages_figure,
+)
 from vslam_ref.support import pages
 from vslam_ref.support.files import write_text
 from vslam_ref.support.json_text import to_json
+from vslam_ref.systems.ptam import STAGES
 from vslam_ref.systems.visual_map import VisualMap
 from vslam_ref.systems.visual_map.adjusting import as_problem
 
 FILM = "overlay.webm"
-FILES = ("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", FILM, "result.json")
+MAPPING = ("start", "look again", "new points", "neighbours", "local", "global")
+"""Stages of a picture that becomes a keyframe."""
+FILES = (
+    *("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", "camera.yaml", FILM),
+    "result.json",
+)
 LEGEND = (
     "Points that were tracked: vermilion, yellow, sky blue, blue (and larger) on levels 0, 1, 2, 3 of the "
     "pyramid; green lines before the start: how corners moved. White: a grid on the dominant plane of the "
@@ -54,13 +72,15 @@ LEGEND = (
 def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
     """Write all but the film into ``folder``."""
     title = f"PTAM on {Path(run.sequence.name).name}"
-    figures = {"course": course_figure(course(run), title)}
+    figures = {"course": course_figure(course(run), title), "stages": stages_figure(stages(run), title)}
     visual_map = run.system.map
     if visual_map is not None:
         write_paths(folder, run, visual_map)
         write_map(folder / "map.ply", visual_map)
         final = accuracy(run.sequence, *path(run))
         figures = {"map": map_figure(scene(run, visual_map, final), title), **figures}
+    if (found := camera_file(run)) is not None:
+        write_opencv(folder / "camera.yaml", found)
     for name, figure in figures.items():
         (folder / f"{name}.png").write_bytes(figure_bytes(figure, "png", "ptam"))
     write_text(folder / "result.json", to_json(content))
@@ -134,9 +154,25 @@ def course(run: Run) -> CourseDrawing:
     )
 
 
+def stages(run: Run) -> StagesDrawing:
+    """Time per stage, as it is drawn."""
+    number = np.array([f.number for f in run.frames], np.int64)
+    times = {
+        name: np.array([1e3 * f.stages.get(name, 0.0) for f in run.frames])
+        for name in STAGES
+        if any(name in f.stages for f in run.frames)
+    }
+    mapping = {name: ms for name, ms in times.items() if name in MAPPING}
+    return StagesDrawing(number, {n: ms for n, ms in times.items() if n not in MAPPING}, mapping)
+
+
 def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures: tuple[str, ...]) -> str:
     """``report.html``: numbers and figures in it, the film beside it."""
-    alt = {"map": "Map and path from three sides", "course": "Points, sigma, quality and time over pictures"}
+    alt = {
+        "map": "Map and path from three sides",
+        "course": "Points, sigma, quality and time over pictures",
+        "stages": "Time per stage over pictures",
+    }
     images = [pages.image(_embedded(folder / f"{name}.png"), alt[name]) for name in figures]
     there = {name: name for name in FILES if (folder / name).exists() or name == "result.json"}
     return pages.page(
@@ -148,6 +184,7 @@ def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures
         _film(folder / FILM),
         pages.table([], number_rows(content), caption="Numbers", kind="numbers"),
         *images,
+        _camera(run),
         _start(content),
         _refusals(content["refusals"]),
         _plane(run),
@@ -170,6 +207,13 @@ def _film(path: Path) -> pages.Html | str:
         return ""
     film = pages.Html(f'<video src="{path.name}" controls muted loop playsinline></video><br>')
     return pages.tag("p", film, LEGEND)
+
+
+def _camera(run: Run) -> pages.Html | str:
+    """The camera as it was given and as it was refined."""
+    rows = camera_rows(run)
+    columns = ["", "given", "refined", "sigma", "unit"]
+    return pages.table(columns, rows, caption="The camera", kind="plain") if rows else ""
 
 
 def _start(content: Mapping[str, Any]) -> pages.Html | str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +63,9 @@ class Frame(NamedTuple):
     sigma : float
         Scale of the errors, pixels of the point's level; NaN where there is no pose.
     seconds : float
-        That the system took.
+        That the system took, by the clock on the wall.
+    stages : mapping of str to float
+        Seconds that its stages took of the processor, as :data:`~vslam_ref.systems.ptam.STAGES` names them.
     keyframe : bool
     marks : Marks
     """
@@ -75,6 +78,7 @@ class Frame(NamedTuple):
     found: int = 0
     sigma: float = np.nan
     seconds: float = np.nan
+    stages: Mapping[str, float] = MappingProxyType({})
     keyframe: bool = False
     marks: Marks = NOTHING
 
@@ -179,7 +183,7 @@ def _one(done: Run, image: Image) -> Frame:
     began = time.perf_counter()
     outcome = done.system.step(image.number, image.grey)
     seconds = time.perf_counter() - began
-    frame = Frame(image.number, image.time, WAITING, seconds=seconds)
+    frame = Frame(image.number, image.time, WAITING, seconds=seconds, stages=outcome.stages)
     if outcome.tracked is not None:
         return _tracked(frame, outcome, outcome.tracked)
     if not had_map and done.system.map is not None and isinstance(outcome.attempt, Attempt):

@@ -5,12 +5,14 @@ module              holds
 ==================  ==============================================================================
 ``ptam``            :class:`Ptam`: a picture in, a pose out, in a fixed order
 ``settings``        every number and its reason
+``presets``         named sets of them: PTAM as it was published, and one part taken out
 ``look``            pyramid and corners of a picture
 ``trails``          before there is a map: corners followed from picture to picture
 ``start``           two pictures to a first map, or why not yet
 ``tracker``         the pose of every picture
 ``policy``          which pictures become keyframes
 ``mapper``          what happens to these
+``refine_camera``   the camera freed in the last adjustment
 ==================  ==============================================================================
 
 A system takes pictures; it opens no files and draws nothing.

@@ -30,7 +30,8 @@ class KeyframePolicy:
         self.since += 1
         inliers = tracked.fine.inliers
         self.best = max(self.best, inliers)
-        may = tracked.quality is not Quality.LOST and inliers >= s.least_inliers
+        enough = (Quality.GOOD,) if s.good_only else (Quality.GOOD, Quality.POOR)
+        may = tracked.quality in enough and inliers >= s.least_inliers
         wait = s.gap if inliers >= s.starving else s.gap_starving
         if not may or tracked.pose.sigma > s.worst_sigma or self.since < wait:
             return False

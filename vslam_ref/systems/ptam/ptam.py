@@ -27,6 +27,7 @@ from vslam_ref.systems.ptam import trails as trail_steps
 from vslam_ref.systems.ptam.look import prepare
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
 from vslam_ref.systems.ptam.policy import KeyframePolicy
+from vslam_ref.systems.ptam.refine_camera import RefinedCamera, refine_camera
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
 from vslam_ref.systems.ptam.tracker.quality import Quality
@@ -107,6 +108,7 @@ class Ptam:
         self.poses: dict[int, Pose] = {}
         self.started_at: tuple[int, int] | None = None
         self.shape: tuple[int, ...] | None = None
+        self.refined: RefinedCamera | None = None
 
     def step(self, number: int, grey: ArrayLike) -> PictureOutcome:
         """Take the next picture.
@@ -181,7 +183,8 @@ class Ptam:
         self.trails = None
 
     def _tracker(self, T_last: Array) -> Tracker:
-        return Tracker(self.settings, self.rng, DecayingVelocity(np.zeros(6), 1.0, 1.0), T_last)
+        s = self.settings.tracker
+        return Tracker(self.settings, self.rng, DecayingVelocity(np.zeros(6), s.decay, s.newest), T_last)
 
     # --- with a map ---------------------------------------------------------------------------
 
@@ -228,9 +231,12 @@ class Ptam:
     # --- the end ------------------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Adjust everything once more."""
-        if self.map is not None:
-            adjust_all(self.map, self.settings, self.settings.last_steps)
+        """Adjust everything once more, and the camera with it if that is wanted."""
+        if self.map is None:
+            return
+        adjust_all(self.map, self.settings, self.settings.last_steps)
+        if self.settings.camera.refine:
+            self.refined = refine_camera(self.map, self.settings)
 
     def trajectory(self) -> tuple[Array, Array]:
         """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""

@@ -14,7 +14,9 @@ class FeatureSettings:
 
     levels: int = assume(4, "", "PTAM's pyramid: 640 x 480 to 80 x 60")
     arc: int = assume(10, "pixels of 16", "PTAM's FAST-10")
-    threshold: int = assume(10, "grey levels", "PTAM's, of all levels but the finest")
+    threshold: int = assume(
+        10, "grey levels", "of all levels but the finest; PTAM's program has 15, 15, 10, to balance them"
+    )
     threshold_finest: int = assume(10, "grey levels", "PTAM's")
     least_eigenvalue: float = assume(
         10.0,
@@ -25,11 +27,12 @@ class FeatureSettings:
     absolute: float = assume(0.0, "grey levels^2", "0: the relative limit; PTAM has an absolute one")
     measure: str = assume("zmssd", "", "PTAM's; zncc is the other")
     first_refine: bool = assume(True, "", "points lie beside corners: corners alone find fewer")
+    warp: bool = assume(True, "", "PTAM's; without, a patch is compared as it was first seen")
 
     @property
     def looks(self) -> Looks:
         """How patches are compared."""
-        return Looks(self.limit, self.measure, self.absolute, self.first_refine)
+        return Looks(self.limit, self.measure, self.absolute, self.first_refine, self.warp)
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,11 @@ class TrackerSettings:
     radius: tuple[float, ...] = assume(
         (10.0, 20.0, 40.0), "px", "constant velocity; small image; small image, wide"
     )
+    small_image: bool = assume(True, "", "the two guesses by small images; PTAM of 2007 has none")
+    decay: float = assume(
+        1.0, "share", "of the velocity that is left after a picture; PTAM's 0.9 lags behind"
+    )
+    newest: float = assume(1.0, "share", "of the newest motion in the velocity; PTAM's 0.5 lags behind")
     fine_radius: float = assume(5.0, "px", "after the coarse pass")
     steps: int = assume(10, "", "PTAM's reweighted steps")
     loss: str = assume("tukey", "", "PTAM's; l2 and huber for comparison")
@@ -76,6 +84,7 @@ class TrackerSettings:
     least_inliers: int = assume(20, "points", "fewer: lost")
     worst_sigma: float = assume(4.0, "px of the level", "more: lost")
     follow: bool = assume(True, "", "lost: follow the last inliers patch by patch, then three points")
+    relocalise: bool = assume(True, "", "still lost: the same from the keyframes most alike")
     recover_inliers: int = assume(30, "points", "of a recovered pose; fewer may be chance")
     similar: int = assume(5, "keyframes", "tried when lost, the most alike small images")
 
@@ -86,6 +95,7 @@ class KeyframeSettings:
 
     least_inliers: int = assume(50, "points", "trap: a starved map must be fed")
     worst_sigma: float = assume(1.5, "px of the level", "a pose that is not good enough spoils the map")
+    good_only: bool = assume(False, "", "PTAM's rule; it starves the map where it is needed most")
     gap: int = assume(4, "pictures", "since the last; PTAM's 20 starve on quick turns")
     starving: int = assume(120, "points", "fewer inliers: the map is about to end, and the next gap counts")
     gap_starving: int = assume(2, "pictures", "since the last, when the map is about to end")
@@ -122,6 +132,19 @@ class MapperSettings:
 
 
 @dataclass(frozen=True)
+class CameraSettings:
+    """Self-calibration at the end; every field has its own unit, beside it."""
+
+    refine: bool = assume(False, "", "the camera that was given is believed; the last adjustment may free it")
+    most_shift: float = assume(
+        5.0,
+        "px",
+        "an intrinsic whose standard deviation moves a pixel farther stays; a dozen times the floor of sigma",
+    )
+    steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
+
+
+@dataclass(frozen=True)
 class Settings:
     """PTAM as it runs."""
 
@@ -131,4 +154,5 @@ class Settings:
     tracker: TrackerSettings = field(default_factory=TrackerSettings)
     keyframe: KeyframeSettings = field(default_factory=KeyframeSettings)
     mapper: MapperSettings = field(default_factory=MapperSettings)
+    camera: CameraSettings = field(default_factory=CameraSettings)
     last_steps: int = assume(40, "", "of the adjustment of everything at the end")

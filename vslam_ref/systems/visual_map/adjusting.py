@@ -19,7 +19,9 @@ from vslam_ref.estimation.bundle import (
     freedom,
 )
 from vslam_ref.estimation.bundle.local import local_problem
+from vslam_ref.estimation.bundle.self_calibration import SelfCalibration, self_calibrate
 from vslam_ref.features import level_sigma
+from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.visual_map.visual_map import VisualMap, neighbours
 
 
@@ -80,29 +82,75 @@ def adjust(
     whole = as_problem(visual_map, fixed)
     if active is None:
         result = bundle_adjust(whole.problem, robust, options)
-        scene, rows = result.problem.scene, np.arange(len(whole.sightings))
-    else:
-        part = local_problem(whole.problem, active)
-        result = bundle_adjust(part.problem, robust, options)
-        scene, rows = part.put_back(whole.problem, result.problem.scene).scene, part.observations
+        return _put_back(visual_map, whole, result.problem.scene, result)
+    part = local_problem(whole.problem, active)
+    result = bundle_adjust(part.problem, robust, options)
+    scene = part.put_back(whole.problem, result.problem.scene).scene
+    return _put_back(visual_map, whole, scene, result, part.observations)
+
+
+def adjust_with_camera(
+    visual_map: VisualMap,
+    camera: Camera,
+    names: tuple[str, ...],
+    robust: Robust,
+    *,
+    most_shift_px: float,
+    options: Options | None = None,
+) -> SelfCalibration:
+    """Move everything but the first keyframe, and those intrinsics that the motion determines.
+
+    Implements :eq:`eq-a2-9` with the camera free.
+
+    Parameters
+    ----------
+    visual_map : VisualMap
+        Changed in place, its camera too, unless there is a reason why not.
+    camera : Camera
+        The map's own camera, in a model that has the intrinsics to be freed.
+    names : tuple of str
+        Intrinsics that may be freed.
+    robust : Robust
+    most_shift_px : float
+        An intrinsic is refused if one standard deviation of it moves some pixel farther.
+    options : Options, optional
+
+    Returns
+    -------
+    SelfCalibration
+    """
+    whole = as_problem(visual_map, camera=camera)
+    height, width = visual_map.shape
+    found = self_calibrate(whole.problem, names, (width, height), robust, options, most_shift_px)
+    if not found.reason:
+        visual_map.change_camera(found.camera)
+        _put_back(visual_map, whole, found.result.problem.scene, found.result)
+    return found
+
+
+def _put_back(
+    visual_map: VisualMap, whole: _Whole, scene: Scene, result: BundleResult, rows: IntArray | None = None
+) -> Adjusted:
+    """Write a scene into the map, and take back what had no weight; rows of the problem, all by default."""
     visual_map.T_kf_world[:] = scene.T_cam_world
     visual_map.X_world[whole.points] = scene.X_world
-    wrong = rows[(result.weights <= 0.0) | ~result.valid]
+    wrong = np.flatnonzero((result.weights <= 0.0) | ~result.valid)
+    wrong = wrong if rows is None else rows[wrong]
     died = visual_map.take_back(whole.sightings[wrong])
     return Adjusted(result, len(wrong), died)
 
 
-def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,)) -> _Whole:
+def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,), camera: Camera | None = None) -> _Whole:
     """Return the living points and their sightings as a problem of bundle adjustment, in pixels.
 
-    Keyframes ``fixed (f,)`` do not move.
+    Keyframes ``fixed (f,)`` do not move; ``camera`` is the map's by default.
     """
     seen = visual_map.sightings
     on = np.flatnonzero(seen["on"])
     points = np.flatnonzero(visual_map.alive)
     new = np.full(len(visual_map.points), -1)
     new[points] = np.arange(len(points))
-    camera = visual_map.camera
+    camera = camera or visual_map.camera
     scene = Scene(visual_map.T_kf_world, visual_map.X_world[points], camera.params[None])
     cov = np.eye(2) * (level_sigma(seen["level"][on]) ** 2)[:, None, None]
     observed = Observations(seen["kf"][on], new[seen["point"][on]], seen["uv"][on], cov)

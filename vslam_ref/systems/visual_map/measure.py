@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import (
     Corners,
     Templates,
@@ -20,7 +20,7 @@ from vslam_ref.features import (
     zmssd,
 )
 from vslam_ref.features.patch_search import AREA, LIMIT, variation
-from vslam_ref.systems.visual_map.visibility import Visible, sources, templates
+from vslam_ref.systems.visual_map.visibility import Sources, Visible, sources, templates
 from vslam_ref.systems.visual_map.visual_map import Bytes, PreparedPicture, VisualMap
 
 LEAST_RADIUS = 1.5
@@ -40,12 +40,15 @@ class Looks(NamedTuple):
         If above 0, a limit of the ZMSSD in squared grey levels instead, as PTAM has it.
     first_refine : bool
         Refine from the expected place before corners are asked.
+    warp : bool
+        Warp the template as the surface should look; else it is compared as it was first seen.
     """
 
     limit: float = LIMIT
     measure: str = "zmssd"
     absolute: float = 0.0
     first_refine: bool = True
+    warp: bool = True
 
 
 PLAIN = Looks()
@@ -77,7 +80,10 @@ def look(
     -------
     Located
     """
-    patches = templates(visual_map, sources(visual_map, seen.point), seen.A, seen.level)
+    origin = sources(visual_map, seen.point)
+    patches = templates(
+        visual_map, origin, seen.A if looks.warp else _as_seen(origin, seen.level), seen.level
+    )
     place, ok = seen.uv.copy(), np.zeros(len(seen.point), np.bool_)
     reach = np.broadcast_to(np.asarray(radius, np.float64), len(place)) / level_sigma(seen.level)
     reach = np.maximum(reach, LEAST_RADIUS)
@@ -97,6 +103,12 @@ def look(
         place[rows] = finest_from_level(found.uv, level)
         ok[rows] = found.ok
     return Located(place, ok)
+
+
+def _as_seen(origin: Sources, level: IntArray) -> Array:
+    """A (n, 2, 2) by which a pixel of a level (n,) is a pixel of the source's: no turn, no shear."""
+    A: Array = np.eye(2) * (level_sigma(level) / level_sigma(origin.level))[:, None, None]
+    return A
 
 
 def locate(

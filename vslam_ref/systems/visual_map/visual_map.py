@@ -207,6 +207,12 @@ class VisualMap:
         seen["on"][~alive[seen["point"]]] = False
         self.version += 1
 
+    def change_camera(self, camera: Camera) -> None:
+        """Take another camera; poses, points and sightings stay."""
+        self.camera = camera
+        self.points["slope"][:] = slopes(camera, self.points["source_uv"])
+        self.version += 1
+
     def measured_in(self, kf: int) -> IntArray:
         """Numbers of the points (n,) that a keyframe sees."""
         seen = self.sightings

@@ -64,7 +64,7 @@ class Tracker:
         Implements A§2.2.1, tracking in two passes.
         """
         found = self._predicted(visual_map, picture) if self.lost == 0 else None
-        if (found is None or found.quality is Quality.LOST) and self.settings.tracker.follow:
+        if found is None or found.quality is Quality.LOST:
             with stage("recover"):
                 found = self._recovered(visual_map, picture) or found
         if found is None:
@@ -108,7 +108,7 @@ class Tracker:
         """Guesses of the pose, each with the radius in which to look."""
         radius = self.settings.tracker.radius
         yield "velocity", self.motion.predict(self.T_last), radius[0]
-        if self.last is None:
+        if self.last is None or not self.settings.tracker.small_image:
             return
         with stage("guess"):
             turned = self._turned(visual_map, picture, self.last)
@@ -127,11 +127,11 @@ class Tracker:
     def _recovered(self, visual_map: VisualMap, picture: PreparedPicture) -> Tracked | None:
         """Follow patches from the last picture that was tracked, else from the keyframes most alike."""
         s = self.settings.tracker
-        if self.lost == 0 and self.last is not None and self.known is not None:
+        if s.follow and self.lost == 0 and self.last is not None and self.known is not None:
             found = self._from(visual_map, picture, self.last, self.known, "followed")
             if found is not None:
                 return found
-        for kf in recover.most_alike(visual_map, picture, s.similar):
+        for kf in recover.most_alike(visual_map, picture, s.similar if s.relocalise else 0):
             there = recover.picture_of(visual_map, int(kf))
             known = recover.known_in(visual_map, int(kf))
             found = self._from(visual_map, picture, there, known, "relocalised")
