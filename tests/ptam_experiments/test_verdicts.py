@@ -9,12 +9,22 @@ import numpy as np
 import pytest
 
 from vslam_ref.experiments.framework import Study, load, summaries
-from vslam_ref.experiments.ptam import fig2_1, fig2_2, fig2_3, framerate, offset_claims, passes, wrong_matches
+from vslam_ref.experiments.ptam import (
+    fig2_1,
+    fig2_2,
+    fig2_3,
+    framerate,
+    offset_claims,
+    parts,
+    passes,
+    wrong_matches,
+)
 from vslam_ref.experiments.ptam.fig2_1 import Fig21Found
 from vslam_ref.experiments.ptam.fig2_2 import MAPPER, FlowRun
 from vslam_ref.experiments.ptam.fig2_3 import Fig23Run
 from vslam_ref.experiments.ptam.framerate import FramerateConfig, FramerateRun
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun
+from vslam_ref.experiments.ptam.parts import PartsRun
 from vslam_ref.experiments.ptam.passes import PassesConfig, PassesRun
 from vslam_ref.experiments.ptam.recorded import recorded
 from vslam_ref.experiments.ptam.turning_claims import claims as turning_claims
@@ -266,3 +276,31 @@ def test_frame_rates() -> None:
     assert set(verdicts(framerate.claims(rates(1 / 15))).values()) == {YES}
     assert set(verdicts(framerate.claims(rates(1 / 100))).values()) == {NO}
     assert set(verdicts(framerate.claims(rates(1 / 25))).values()) == {NO}  # always above 20
+
+
+# --- parts ----------------------------------------------------------------------------------------
+
+
+def parts_study(without: tuple[float, float], published: tuple[float, float], whole: float = 1.0) -> Study:
+    """Five seeds; share and error of the system without the part, and as published; the whole has 0.1 %."""
+    config = parts.PartsConfig()
+    told = {parts.WHOLE: (whole, 0.1), parts.PUBLISHED: published}
+    data = {}
+    for variant in parts.variants(config):
+        share, error = told.get(variant.preset, without)
+        data[parts.words(variant)] = PartsRun(np.ones(5, bool), np.full(5, share), np.full(5, error))
+    return Study(config, data)
+
+
+def test_parts() -> None:
+    assert set(verdicts(parts.claims(parts_study((0.5, 0.1), (1.0, 3.0)))).values()) == {YES}
+    assert set(verdicts(parts.claims(parts_study((1.0, 0.5), (0.4, 0.1)))).values()) == {YES}
+    assert set(verdicts(parts.claims(parts_study((0.95, 0.15), (1.0, 0.1)))).values()) == {NO}
+    lost = verdicts(parts.claims(parts_study((0.5, 0.9), (0.5, 0.9), whole=0.7)))
+    assert [v for id, v in lost.items() if id != "published-constants"] == [NO] * 4
+
+
+def test_a_run_without_an_error_is_the_worst() -> None:
+    """Without a path there is no error: that must not make a part look useless."""
+    found = verdicts(parts.claims(parts_study((1.0, np.nan), (1.0, np.nan))))
+    assert set(found.values()) == {YES}
