@@ -23,6 +23,7 @@ from vslam_ref.experiments.ptam.offset_claims import claims, counted
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
 from vslam_ref.experiments.ptam.recorded import found, open_recorded, recorded
 from vslam_ref.support.config import assume
+from vslam_ref.systems.ptam.presets import PRESETS, preset
 from vslam_ref.systems.ptam.settings import Settings
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class OffsetsConfig:
     sequences: tuple[str, ...] = assume(ALL, "", "all of the table; those that are not found are left out")
     runs: int = assume(10, "offsets", "all of the table")
     pictures: int = assume(0, "pictures", "of a run at most; 0: to the last")
+    preset: str = assume("", "", "the settings as they come; else a named set of them, such as ptam2007")
     seed: int = assume(0, "", "of the system's one generator, as it comes")
 
     def __post_init__(self) -> None:
@@ -46,6 +48,8 @@ class OffsetsConfig:
         unknown = [name for name in self.sequences if name not in recorded()]
         if unknown or not self.sequences:
             raise ValueError(f"sequences={', '.join(self.sequences)}: need some of {', '.join(recorded())}")
+        if self.preset and self.preset not in PRESETS:
+            raise ValueError(f"preset={self.preset}: need one of {', '.join(PRESETS)}, or none")
         if not 1 <= self.runs <= 10 or self.pictures < 0 or self.seed < 0:
             given = f"runs={self.runs}, pictures={self.pictures}, seed={self.seed}"
             raise ValueError(f"{given}: need 1 to 10 runs, and no number below 0")
@@ -74,7 +78,8 @@ def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
     def stop(done: running.Run) -> bool:
         return done.system.map is None and len(done.frames) >= each.start_within
 
-    done = running.run(sequence, replace(Settings(), seed=config.seed), stop)
+    settings = preset(config.preset) if config.preset else Settings()
+    done = running.run(sequence, replace(settings, seed=config.seed), stop)
     return told(each, offset, done)
 
 
