@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -111,6 +112,24 @@ def test_another_process_writes_the_same_bytes(ran: Any, tmp_path: Path) -> None
     assert not (tmp_path / "out" / "overlay.webm").exists()
     assert "pictures with a pose" in done.stdout
     assert "tracking:" not in done.stderr  # no progress where there is no terminal
+
+
+def test_the_start_can_be_chosen(ran: Any, run: Callable[..., int], tmp_path: Path) -> None:
+    words = ["--video", "none", "--start", "2,9", "--json", tmp_path / "n.json"]
+    assert run(ran.source, "--out", tmp_path / "out", *words) == 0
+    n = json.loads((tmp_path / "n.json").read_text())
+    assert n["started_at"] == [2, 9]
+    assert n["tracked"] == 10
+    assert n["ate_rmse"] < 0.003
+
+
+def test_a_chosen_start_that_cannot_be_is_told(
+    ran: Any, run: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(ran.source, "--out", tmp_path / "out", "--start", "2,3") == 0
+    told = "no start: pictures 2 and 3 make no start: the rays of a point differ by"
+    assert f"note: {told}" in capsys.readouterr().out
+    assert "pictures 2 and 3 make no start" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_an_interrupt_saves_the_run_so_far(

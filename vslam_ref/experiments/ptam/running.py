@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
+from vslam_ref.systems.ptam.chosen import ChosenStart
 from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
+from vslam_ref.systems.ptam.trails import Trails
 
 UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
 STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)
@@ -128,6 +130,8 @@ class Run:
         """Why there is no map, by the most frequent reason; None if there is one."""
         if self.system.map is not None:
             return None
+        if self.system.chosen is not None:
+            return self.system.chosen.no_start()
         if not self.refusals:
             return "no picture could be looked at" if not self._looked_at() else "one picture is no start"
         kind, count = self.refusals.most_common(1)[0]
@@ -142,6 +146,8 @@ def run(
     settings: Settings,
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[], object] = lambda: None,
+    *,
+    chosen: ChosenStart | None = None,
 ) -> Run:
     """Run PTAM over a sequence.
 
@@ -154,6 +160,8 @@ def run(
         Asked before each picture; true ends the run there.
     progress : callable
         Called after each picture.
+    chosen : ChosenStart, optional
+        Two pictures to start from.
 
     Raises
     ------
@@ -162,7 +170,7 @@ def run(
     """
     if sequence.camera is None:
         raise ValueError(f"{sequence.name} has no camera: need one")
-    done = Run(sequence, settings, Ptam(sequence.camera, settings))
+    done = Run(sequence, settings, Ptam(sequence.camera, settings, chosen))
     for image in sequence:
         if stop():
             done.interrupted = True
@@ -219,6 +227,8 @@ def _start_marks(attempt: Attempt) -> Marks:
 def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Frame:
     """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
     trails, start = done.system.trails, done.settings.start
+    if done.system.chosen is not None:
+        return frame if trails is None else frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
     if isinstance(outcome.attempt, Attempt):
         done.refused(outcome.attempt.reason)
     elif outcome.attempt is not None:
@@ -235,10 +245,12 @@ def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Fr
         done.refused(f"{moved}: a start is tried from {start.least_motion:g} px on")
     elif outcome.attempt is None:
         done.refused("corners were followed over too few pictures")
-    marks = Marks(
-        trails.now.astype(np.float32), trails.level.astype(np.uint8), trails.first.astype(np.float32)
-    )
-    return frame._replace(tried=len(trails.now), marks=marks)
+    return frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
+
+
+def _trail_marks(trails: Trails) -> Marks:
+    now, first = trails.now.astype(np.float32), trails.first.astype(np.float32)
+    return Marks(now, trails.level.astype(np.uint8), first)
 
 
 def path(run: Run, live: bool = False) -> tuple[IntArray, Array]:

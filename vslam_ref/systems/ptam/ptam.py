@@ -24,6 +24,7 @@ from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.support.stopwatch import Stopwatch, stage
 from vslam_ref.systems.ptam import trails as trail_steps
+from vslam_ref.systems.ptam.chosen import ChosenStart
 from vslam_ref.systems.ptam.look import prepare
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
 from vslam_ref.systems.ptam.policy import KeyframePolicy
@@ -93,10 +94,13 @@ class Ptam:
     ----------
     camera : Camera
     settings : Settings, optional
+    chosen : ChosenStart, optional
+        Two pictures to start from; by default the system finds them.
     """
 
     camera: Camera
     settings: Settings = field(default_factory=Settings)
+    chosen: ChosenStart | None = None
 
     def __post_init__(self) -> None:
         s = self.settings
@@ -145,6 +149,8 @@ class Ptam:
     # --- before there is a map ----------------------------------------------------------------
 
     def _before_the_map(self, picture: PreparedPicture) -> PictureOutcome:
+        if self.chosen is not None:
+            return self._towards(self.chosen, picture)
         s, f = self.settings.start, self.settings.features
         if self.trails is not None:
             self.trails = trail_steps.go_on(self.trails, picture, s)
@@ -163,6 +169,13 @@ class Ptam:
         elif found.agrees.sum() > s.keep * len(self.trails.now):
             self.trails = self.trails.only(found.row[found.agrees], found.uv_b[found.agrees])
         return PictureOutcome(picture.number, attempt=found)
+
+    def _towards(self, chosen: ChosenStart, picture: PreparedPicture) -> PictureOutcome:
+        """Go on towards a start from two chosen pictures."""
+        self.trails, told = chosen.take(self.trails, picture, self.camera, self.settings, self.rng)
+        if told.attempt is not None and not told.reason:
+            self._start(told.attempt)
+        return PictureOutcome(picture.number, attempt=told.attempt or told.reason or None)
 
     def _start(self, found: Attempt) -> None:
         """Make the first map, and track the pictures between against it."""
