@@ -73,6 +73,7 @@ and with known data sets:
   vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
 VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
 START = "start from pictures I and J, by their numbers in the source (default: the system finds two)"
+CONCURRENT = "mapping in a thread of its own, beside tracking: quicker, but not the same bytes each time"
 REFINE = "free the camera in the last adjustment, as far as the motion determines it; writes camera.yaml"
 INTERRUPTED = 128 + signal.SIGINT
 
@@ -90,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--every", type=at_least(1), default=1, metavar="K", help="only every K-th picture (default: 1)"
     )
     parser.add_argument("--start", type=two_pictures, metavar="I,J", help=START)
+    parser.add_argument("--concurrent", action="store_true", help=CONCURRENT)
     parser.add_argument("--truth", metavar="FILE", help="true path (TUM, KITTI or EuRoC format)")
     parser.add_argument("--refine-camera", action="store_true", help=REFINE)
     clock = parser.add_mutually_exclusive_group()
@@ -119,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
     warm("features", "patches", "pose", "bundle", "bundle_schur")
     with files.new_folder(out) as folder, interrupts() as interrupted:
         began = time.perf_counter()
-        done = follow(sequence, settings, chosen, interrupted)
+        done = follow(sequence, settings, chosen, options.concurrent, interrupted)
         draw(folder / report.FILM, done, options.video, interrupted)
         content = numbers.document(done, time.perf_counter() - began)
         report.write_report(folder, done, content)
@@ -181,13 +183,19 @@ def chosen_start(pictures: tuple[int, int] | None, sequence: Sequence) -> Chosen
 
 
 def follow(
-    sequence: Sequence, settings: Settings, chosen: ChosenStart | None, interrupted: Interrupts
+    sequence: Sequence,
+    settings: Settings,
+    chosen: ChosenStart | None,
+    concurrent: bool,
+    interrupted: Interrupts,
 ) -> Run:
     """Run with a progress bar; Ctrl-C ends it after the picture."""
     from vslam_ref.experiments.ptam import running
 
     with progress_bar(len(sequence), "picture", "tracking") as bar:
-        done = running.run(sequence, settings, lambda: interrupted.asked, bar.update, chosen=chosen)
+        done = running.run(
+            sequence, settings, lambda: interrupted.asked, bar.update, chosen=chosen, concurrent=concurrent
+        )
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     return done

@@ -6,6 +6,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
 from vslam_ref.systems.ptam.chosen import ChosenStart
+from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
@@ -148,6 +150,7 @@ def run(
     progress: Callable[[], object] = lambda: None,
     *,
     chosen: ChosenStart | None = None,
+    concurrent: bool = False,
 ) -> Run:
     """Run PTAM over a sequence.
 
@@ -162,6 +165,8 @@ def run(
         Called after each picture.
     chosen : ChosenStart, optional
         Two pictures to start from.
+    concurrent : bool
+        With the mapper in a thread of its own.
 
     Raises
     ------
@@ -170,17 +175,27 @@ def run(
     """
     if sequence.camera is None:
         raise ValueError(f"{sequence.name} has no camera: need one")
-    done = Run(sequence, settings, Ptam(sequence.camera, settings, chosen))
-    for image in sequence:
-        if stop():
-            done.interrupted = True
-            break
-        done.frames.append(_one(done, image))
-        progress()
-    began = time.perf_counter()
-    done.system.finish()
-    done.finish_seconds = time.perf_counter() - began
+    system = (ConcurrentPtam if concurrent else Ptam)(sequence.camera, settings, chosen)
+    done = Run(sequence, settings, system)
+    with closing(system):
+        for image in sequence:
+            if stop():
+                done.interrupted = True
+                break
+            done.frames.append(_one(done, image))
+            progress()
+        began = time.perf_counter()
+        system.finish()
+        done.finish_seconds = time.perf_counter() - began
+    if isinstance(system, ConcurrentPtam):
+        done.frames = [_with_mapping(frame, system.mapping_stages) for frame in done.frames]
     return done
+
+
+def _with_mapping(frame: Frame, mapping: Mapping[int, Mapping[str, float]]) -> Frame:
+    """A picture with the time that the mapper's thread took for it, where it became a keyframe."""
+    more = mapping.get(frame.number)
+    return frame if more is None else frame._replace(stages={**more, **frame.stages})
 
 
 def _one(done: Run, image: Image) -> Frame:
@@ -213,7 +228,7 @@ def _tracked(frame: Frame, outcome: PictureOutcome, tracked: Tracked) -> Frame:
         tried=len(fine.seen.point),
         found=int(held.sum()),
         sigma=float(tracked.pose.sigma),
-        keyframe=outcome.mapped is not None,
+        keyframe=outcome.mapped is not None or outcome.queued,
         marks=marks,
     )
 
