@@ -61,13 +61,14 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     event.set()
 
 
-def test_forty_pictures_within_the_bounds_of_the_interleaved_form(film: Film) -> None:
-    system = ConcurrentPtam(film.camera)
-    outcomes = [system.step(k, grey) for k, grey in enumerate(film.pictures[:40])]
+def test_forty_pictures_within_the_bounds_of_the_interleaved_form() -> None:
+    world = scene("desk", 3, frames=160)
+    large = Film([world.frame(k) for k in range(0, 160, 4)], world.camera, world.T_cam_world[::4])
+    system = ConcurrentPtam(large.camera)
+    outcomes = [system.step(k, grey) for k, grey in enumerate(large.pictures)]
     system.finish()
-    done = Run(system, outcomes)  # type: ignore[arg-type]
     assert system.trajectory()[0].tolist() == list(range(40))
-    assert path_error(film, done) < LARGEST_SHARE
+    assert path_error(large, Run(system, outcomes)) < LARGEST_SHARE
     handed = [o.number for o in outcomes if o.queued]
     assert len(handed) >= 3
     assert system.map is not None
@@ -238,21 +239,24 @@ def test_without_a_start_there_is_no_thread(film: Film) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_twenty_runs_over_whole_desks(seed: int) -> None:
-    """600 pictures of 640 x 480 each, in the bounds of the interleaved form.
+    """Five runs over each of four desks, 600 pictures of 640 x 480, in the bounds of the interleaved form.
 
-    ``pytest -m slow tests/ptam/test_concurrent.py -n 1``: some minutes.
+    ``pytest -m slow tests/ptam/test_concurrent.py -n 1``: ten minutes.
     """
     world = scene("desk", seed)
-    system = ConcurrentPtam(world.camera)
-    for k in range(len(world)):
-        system.step(k, world.frame(k))
-    system.finish()
-    numbers, T = system.trajectory()
-    assert system.started_at is not None
-    after = len(world) - system.started_at[0]
-    assert len(numbers) >= 0.99 * after
-    true = camera_pose.centre_from_pose(world.T_cam_world[numbers])
-    fit = align(camera_pose.centre_from_pose(T), true, with_scale=True)
-    assert fit.rmse < LARGEST_SHARE * float(np.linalg.norm(np.diff(true, axis=0), axis=1).sum())
+    pictures = [world.frame(k) for k in range(len(world))]
+    for _ in range(5):
+        system = ConcurrentPtam(world.camera)
+        for k, grey in enumerate(pictures):
+            system.step(k, grey)
+        system.finish()
+        numbers, T = system.trajectory()
+        assert system.started_at is not None
+        assert len(numbers) >= 0.99 * (len(world) - system.started_at[0])
+        true = camera_pose.centre_from_pose(world.T_cam_world[numbers])
+        fit = align(camera_pose.centre_from_pose(T), true, with_scale=True)
+        length = float(np.linalg.norm(np.diff(true, axis=0), axis=1).sum())
+        print(f"seed {seed}: {len(numbers)} poses, error {fit.rmse / length:.5f} of the path")
+        assert fit.rmse < LARGEST_SHARE * length

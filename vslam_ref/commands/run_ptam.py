@@ -41,6 +41,10 @@ reading and drawing.
 --start I,J: corners are followed from picture I to J, and one start is tried there: it holds, or the run ends
 without a map and says why. Pictures between both are tracked afterwards; those before I are not.
 
+--concurrent: the mapper works in a thread of its own, and the tracker waits for it only where a keyframe was
+handed over mapper.lag pictures ago. Paths differ a little from run to run; without it, the same pictures give
+the same bytes.
+
 --refine-camera: what the motion does not determine keeps its value, and is named with its standard deviation
 (sigma). camera_shift_px: how far from its place the refined camera shows what the given one sees in a pixel,
 largest and RMS over the picture. Run again with '--camera DIR/camera.yaml' to use the camera from the start.
