@@ -63,10 +63,10 @@ def test_bad_pictures_and_odd_times_cost_no_more_than_themselves(
 def test_bad_pictures_at_the_beginning_and_wrong_order_do_not_hinder_the_start(
     run: Callable[..., int], tmp_path: Path
 ) -> None:
-    """0 is missing, 1 half-written, 2 black, 3 of another size, 4 blank; 8 comes twice; 14 and 15 are swapped."""
+    """0 is empty, 1 half-written, 2 black, 3 of another size, 4 blank; 8 comes twice; 14, 15 are swapped."""
     folder = small_world.write(tmp_path / "boards", 20)
     images = folder / "images"
-    (images / "000000.png").unlink()
+    (images / "000000.png").write_bytes(b"")
     whole = (images / "000001.png").read_bytes()
     (images / "000001.png").write_bytes(whole[: len(whole) // 2])
     for k, shape, grey in ((2, (240, 320), 0), (3, (120, 160), 80), (4, (240, 320), 128)):
