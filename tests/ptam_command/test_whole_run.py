@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,6 +115,24 @@ def test_another_process_writes_the_same_bytes(ran: Any, tmp_path: Path) -> None
     assert "tracking:" not in done.stderr  # no progress where there is no terminal
 
 
+def test_the_start_can_be_chosen(ran: Any, run: Callable[..., int], tmp_path: Path) -> None:
+    words = ["--video", "none", "--start", "2,9", "--json", tmp_path / "n.json"]
+    assert run(ran.source, "--out", tmp_path / "out", *words) == 0
+    n = json.loads((tmp_path / "n.json").read_text())
+    assert n["started_at"] == [2, 9]
+    assert n["tracked"] == 10
+    assert n["ate_rmse"] < 0.003
+
+
+def test_a_chosen_start_that_cannot_be_is_told(
+    ran: Any, run: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(ran.source, "--out", tmp_path / "out", "--start", "2,3") == 0
+    told = "no start: pictures 2 and 3 make no start: the rays of a point differ by"
+    assert f"note: {told}" in capsys.readouterr().out
+    assert "pictures 2 and 3 make no start" in (tmp_path / "out" / "report.html").read_text()
+
+
 def test_an_interrupt_saves_the_run_so_far(
     ran: Any,
     run: Callable[..., int],
@@ -139,6 +159,61 @@ def test_an_interrupt_saves_the_run_so_far(
     assert len((tmp_path / "out" / "trajectory.txt").read_text().splitlines()) == 1 + 8
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_mapping_beside_tracking_leaves_the_same_kinds_of_things(
+    ran: Any, run: Callable[..., int], tmp_path: Path
+) -> None:
+    assert run(ran.source, "--out", tmp_path / "out", "--concurrent", "--json", tmp_path / "n.json") == 0
+    n = json.loads((tmp_path / "n.json").read_text())
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
+    assert (n["tracked"], n["lost"], n["concurrent"]) == (12, 0, True)
+    assert ran.numbers["concurrent"] is False
+    assert n["ate_rmse"] < 0.003
+    assert not [t for t in threading.enumerate() if t.name == "mapper"]
+
+
+@pytest.mark.parametrize("interrupts", [1, 2])
+def test_an_interrupt_ends_the_mapper_too(
+    ran: Any,
+    run: Callable[..., int],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    interrupts: int,
+) -> None:
+    """Once: the run so far is saved.  Twice: nothing is left, and no thread either."""
+    real = running._one
+
+    def one(done: running.Run, image: Any) -> running.Frame:
+        frame = real(done, image)
+        if image.number == 9:
+            for _ in range(interrupts):
+                signal.raise_signal(signal.SIGINT)
+        return frame
+
+    monkeypatch.setattr(running, "_one", one)
+    words = ["--out", tmp_path / "out", "--video", "none", "--concurrent"]
+    assert run(ran.source, *words) == 130
+    assert (tmp_path / "out" / "trajectory.txt").exists() == (interrupts == 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"] * (interrupts == 1)
+    assert not [t for t in threading.enumerate() if t.name == "mapper"]
+
+
+def test_an_exception_while_pictures_come_ends_the_mapper(
+    ran: Any, run: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = running._one
+
+    def one(done: running.Run, image: Any) -> running.Frame:
+        if image.number == 10:
+            raise ZeroDivisionError
+        return real(done, image)
+
+    monkeypatch.setattr(running, "_one", one)
+    with pytest.raises(ZeroDivisionError):
+        run(ran.source, "--out", tmp_path / "out", "--video", "none", "--concurrent")
+    assert list(tmp_path.iterdir()) == []
+    assert not [t for t in threading.enumerate() if t.name == "mapper"]
 
 
 def test_a_second_interrupt_ends_at_once_and_leaves_nothing(

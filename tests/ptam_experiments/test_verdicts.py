@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from vslam_ref.experiments.ptam import (
     offset_claims,
     parts,
     passes,
+    two_pipelines,
     wrong_matches,
 )
 from vslam_ref.experiments.ptam.fig2_1 import Fig21Found
@@ -304,3 +306,43 @@ def test_a_run_without_an_error_is_the_worst() -> None:
     """Without a path there is no error: that must not make a part look useless."""
     found = verdicts(parts.claims(parts_study((1.0, np.nan), (1.0, np.nan))))
     assert set(found.values()) == {YES}
+
+
+# --- two pipelines --------------------------------------------------------------------------------
+
+
+def latencies(in_line: float, beside: float, error: float = 0.1) -> Study:
+    """Two of a hundred pictures are this late, the others 10 ms."""
+    latency = {way: np.where(np.arange(100) < 2, late, 0.01) for way, late in
+               zip(two_pipelines.WAYS, (in_line, beside), strict=True)}  # fmt: skip
+    errors = {way: np.full(3, error) for way in two_pipelines.WAYS}
+    return Study(two_pipelines.TwoPipelinesConfig(), None, two_pipelines.LatencyRun(latency, errors))
+
+
+def test_two_pipelines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(two_pipelines, "cores", lambda: 2)
+    assert set(verdicts(two_pipelines.claims(latencies(0.3, 0.02))).values()) == {YES}
+    assert set(verdicts(two_pipelines.claims(latencies(0.3, 0.1, error=2.0))).values()) == {NO}
+    not_needed = verdicts(two_pipelines.claims(latencies(0.02, 0.02, error=np.nan)))
+    assert set(not_needed.values()) == {NO}
+    monkeypatch.setattr(two_pipelines, "cores", lambda: 1)
+    assert (
+        verdicts(two_pipelines.claims(latencies(0.3, 0.02)))["two-pipelines-make-real-time-possible"] == OPEN
+    )
+
+
+def test_a_picture_that_waits_is_late_by_that() -> None:
+    """Steps of 30 ms where pictures come every 10: the n-th waits 20 n ms."""
+    tracked = SimpleNamespace(quality=None)
+
+    class Slow:
+        map = object()
+
+        def step(self, k: int, image: object) -> SimpleNamespace:
+            time.sleep(0.03)
+            return SimpleNamespace(tracked=tracked)
+
+    late = two_pipelines.paced(Slow(), [np.zeros(0)] * 20, 100.0)  # type: ignore[arg-type]
+    least = 0.03 + 0.02 * np.arange(two_pipelines.SETTLED, 20)
+    assert len(late) == 20 - two_pipelines.SETTLED
+    assert (late >= least - 1e-3).all()

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from vslam_ref.datasets.sequences import Sequence
     from vslam_ref.experiments.ptam.interrupting import Interrupts
     from vslam_ref.experiments.ptam.running import Run
+    from vslam_ref.systems.ptam import ChosenStart
     from vslam_ref.systems.ptam.settings import Settings
 
 SYSTEMS = {"ptam": "PTAM: a path and a map of points from the pictures of one moving camera"}
@@ -36,6 +37,13 @@ numbers (also in --json): pictures, those with a pose, lost, relocalised; keyfra
 and the live path after alignment by a similarity (null without truth); scale_drift, the scale that brings the
 last third of the path to the truth over that of the first (below 1: the map grew); pictures a second without
 reading and drawing.
+
+--start I,J: corners are followed from picture I to J, and one start is tried there: it holds, or the run ends
+without a map and says why. Pictures between both are tracked afterwards; those before I are not.
+
+--concurrent: the mapper works in a thread of its own, and the tracker waits for it only where a keyframe was
+handed over mapper.lag pictures ago. Paths differ a little from run to run; without it, the same pictures give
+the same bytes.
 
 --refine-camera: what the motion does not determine keeps its value, and is named with its standard deviation
 (sigma). camera_shift_px: how far from its place the refined camera shows what the given one sees in a pixel,
@@ -61,12 +69,15 @@ with a rendered scene, which has its own camera and truth:
 with your own pictures:
   vslam-ref run ptam walk.mp4 --camera camera.yaml --out out/walk
   vslam-ref run ptam pictures/ --camera camera.yaml --rate 10 --truth groundtruth.txt --out out/pictures
+  vslam-ref run ptam walk.mp4 --camera camera.yaml --start 30,45 --out out/walk
 and with known data sets:
   vslam-ref run ptam new_tsukuba_150 --out out/tsukuba --json tsukuba.json
   vslam-ref run ptam kitti07_head --refine-camera --out out/kitti
   vslam-ref run ptam kitti07_head --camera out/kitti/camera.yaml --out out/kitti2
   vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
 VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
+START = "start from pictures I and J, by their numbers in the source (default: the system finds two)"
+CONCURRENT = "mapping in a thread of its own, beside tracking: quicker, but not the same bytes each time"
 REFINE = "free the camera in the last adjustment, as far as the motion determines it; writes camera.yaml"
 INTERRUPTED = 128 + signal.SIGINT
 
@@ -83,6 +94,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--every", type=at_least(1), default=1, metavar="K", help="only every K-th picture (default: 1)"
     )
+    parser.add_argument("--start", type=two_pictures, metavar="I,J", help=START)
+    parser.add_argument("--concurrent", action="store_true", help=CONCURRENT)
     parser.add_argument("--truth", metavar="FILE", help="true path (TUM, KITTI or EuRoC format)")
     parser.add_argument("--refine-camera", action="store_true", help=REFINE)
     clock = parser.add_mutually_exclusive_group()
@@ -108,10 +121,11 @@ def run(options: argparse.Namespace) -> int:
     assert out is not None  # --out is required
     settings = settings_from([*options.set, *(["camera.refine=true"] * options.refine_camera)])
     sequence = open_source(options)
+    chosen = chosen_start(options.start, sequence)
     warm("features", "patches", "pose", "bundle", "bundle_schur")
     with files.new_folder(out) as folder, interrupts() as interrupted:
         began = time.perf_counter()
-        done = follow(sequence, settings, interrupted)
+        done = follow(sequence, settings, chosen, options.concurrent, interrupted)
         draw(folder / report.FILM, done, options.video, interrupted)
         content = numbers.document(done, time.perf_counter() - began)
         report.write_report(folder, done, content)
@@ -139,12 +153,53 @@ def open_source(options: argparse.Namespace) -> Sequence:
     return sequence.part(options.first, options.end, options.every)
 
 
-def follow(sequence: Sequence, settings: Settings, interrupted: Interrupts) -> Run:
+def two_pictures(text: str) -> tuple[int, int]:
+    """Read the numbers of two pictures.
+
+    Examples
+    --------
+    >>> two_pictures("4,12")
+    (4, 12)
+    """
+    first, comma, last = text.partition(",")
+    if not (comma and first.strip().isdecimal() and last.strip().isdecimal() and int(first) < int(last)):
+        what = "expected two numbers of pictures, the first one smaller, as 4,12"
+        raise argparse.ArgumentTypeError(f"{text!r}: {what}")
+    return int(first), int(last)
+
+
+def chosen_start(pictures: tuple[int, int] | None, sequence: Sequence) -> ChosenStart | None:
+    """The start that was chosen; refused if the run does not come by both pictures."""
+    from vslam_ref.support.errors import InputError
+    from vslam_ref.systems.ptam import ChosenStart
+
+    if pictures is None:
+        return None
+    numbers = sequence.numbers
+    for number in pictures:
+        if number not in numbers:
+            step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
+            steps = f" in steps of {step}" if step > 1 else ""
+            has = f"it has {numbers[0]} to {numbers[-1]}{steps}"
+            words = ",".join(map(str, pictures))
+            raise InputError(f"--start {words}: picture {number} is not in this run; {has}")
+    return ChosenStart(*pictures)
+
+
+def follow(
+    sequence: Sequence,
+    settings: Settings,
+    chosen: ChosenStart | None,
+    concurrent: bool,
+    interrupted: Interrupts,
+) -> Run:
     """Run with a progress bar; Ctrl-C ends it after the picture."""
     from vslam_ref.experiments.ptam import running
 
     with progress_bar(len(sequence), "picture", "tracking") as bar:
-        done = running.run(sequence, settings, lambda _: interrupted.asked, bar.update)
+        done = running.run(
+            sequence, settings, lambda _: interrupted.asked, bar.update, chosen=chosen, concurrent=concurrent
+        )
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     return done

@@ -153,3 +153,34 @@ def rates_figure(rates: Mapping[str, Mapping[str, Array]], marks: Sequence[float
         panels[0].set_ylabel("pictures done at that rate [%]")
         style.legend_below(figure, panels[0], 2)
     return figure
+
+
+PIPELINES = {"in line": (style.VERMILION, "--"), "beside": (style.BLUE, "-")}
+
+
+def latency_figure(latency: Mapping[str, Array], budget: float) -> Figure:
+    """Draw how many pictures are later than a time.
+
+    Parameters
+    ----------
+    latency : mapping of str to ndarray
+        "in line" and "beside" -> seconds of every picture.
+    budget : float
+        Seconds from picture to picture.
+    """
+    with style.house_style():
+        figure, (panel,) = style.new_figure(4.0)
+        for way, values in latency.items():
+            colour, line = PIPELINES[way]
+            x = np.sort(1e3 * values)
+            panel.step(x, 100 * (1 - np.arange(len(x)) / max(len(x), 1)), line, color=colour, where="pre",
+                       label=f"mapping {way}")  # fmt: skip
+        panel.axvline(1e3 * budget, color=style.GREY, lw=1.2, ls=":", label="the next picture")
+        panel.axhline(1.0, color=style.GREY, lw=0.8)
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_ylim(0.05, 120)
+        panel.set_xlabel("from a picture to its pose [ms]")
+        panel.set_ylabel("pictures that are later [%]")
+        style.legend_below(figure, panel, 3)
+    return figure

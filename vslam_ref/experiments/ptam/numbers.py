@@ -18,7 +18,7 @@ from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.metrics.trajectory import Trajectory, absolute_error
 from vslam_ref.support.config import assumptions
 from vslam_ref.support.provenance import versions
-from vslam_ref.systems.ptam import STAGES
+from vslam_ref.systems.ptam import STAGES, ConcurrentPtam
 from vslam_ref.systems.ptam.settings import Settings
 
 ROWS = (
@@ -118,6 +118,7 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
         "stage_ms": stage_ms(run),
         "seconds": seconds,
         "interrupted": run.interrupted,
+        "concurrent": isinstance(system, ConcurrentPtam),
         "start": _start(run),
         "refusals": {run.examples[kind]: n for kind, n in run.refusals.most_common()},
         "settings": changed(run.settings),

@@ -117,13 +117,18 @@ def pictures_of(name: str, seed: int, pictures: int, noise: float) -> Sequence:
     else:
         made = makers[name](seed, pictures, noise)
         frame = made.frame
+    return replace(as_sequence(name, made), picture=lambda k: Picture(frame(k)))
+
+
+def as_sequence(name: str, made: RenderedScene) -> Sequence:
+    """A scene as a sequence with camera and truth."""
     return Sequence(
         name=name,
         layout="rendered",
         size=made.size,
         times=made.times,
-        numbers=np.arange(pictures),
-        picture=lambda k: Picture(frame(k)),
+        numbers=np.arange(len(made)),
+        picture=lambda k: Picture(made.frame(k)),
         camera=made.camera,
         truth=made.trajectory(),
     )

@@ -6,6 +6,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple
@@ -15,10 +16,13 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
+from vslam_ref.systems.ptam.chosen import ChosenStart
+from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
+from vslam_ref.systems.ptam.trails import Trails
 
 UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
 STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)
@@ -128,6 +132,8 @@ class Run:
         """Why there is no map, by the most frequent reason; None if there is one."""
         if self.system.map is not None:
             return None
+        if self.system.chosen is not None:
+            return self.system.chosen.no_start()
         if not self.refusals:
             return "no picture could be looked at" if not self._looked_at() else "one picture is no start"
         kind, count = self.refusals.most_common(1)[0]
@@ -142,6 +148,9 @@ def run(
     settings: Settings,
     stop: Callable[[Run], bool] = lambda done: False,
     progress: Callable[[], object] = lambda: None,
+    *,
+    chosen: ChosenStart | None = None,
+    concurrent: bool = False,
 ) -> Run:
     """Run PTAM over a sequence.
 
@@ -154,6 +163,10 @@ def run(
         Asked before each picture, with the run so far; true ends it there.
     progress : callable
         Called after each picture.
+    chosen : ChosenStart, optional
+        Two pictures to start from.
+    concurrent : bool
+        With the mapper in a thread of its own.
 
     Raises
     ------
@@ -162,17 +175,27 @@ def run(
     """
     if sequence.camera is None:
         raise ValueError(f"{sequence.name} has no camera: need one")
-    done = Run(sequence, settings, Ptam(sequence.camera, settings))
-    for image in sequence:
-        if stop(done):
-            done.interrupted = True
-            break
-        done.frames.append(_one(done, image))
-        progress()
-    began = time.perf_counter()
-    done.system.finish()
-    done.finish_seconds = time.perf_counter() - began
+    system = (ConcurrentPtam if concurrent else Ptam)(sequence.camera, settings, chosen)
+    done = Run(sequence, settings, system)
+    with closing(system):
+        for image in sequence:
+            if stop(done):
+                done.interrupted = True
+                break
+            done.frames.append(_one(done, image))
+            progress()
+        began = time.perf_counter()
+        system.finish()
+        done.finish_seconds = time.perf_counter() - began
+    if isinstance(system, ConcurrentPtam):
+        done.frames = [_with_mapping(frame, system.mapping_stages) for frame in done.frames]
     return done
+
+
+def _with_mapping(frame: Frame, mapping: Mapping[int, Mapping[str, float]]) -> Frame:
+    """A picture with the time that the mapper's thread took for it, where it became a keyframe."""
+    more = mapping.get(frame.number)
+    return frame if more is None else frame._replace(stages={**more, **frame.stages})
 
 
 def _one(done: Run, image: Image) -> Frame:
@@ -205,7 +228,7 @@ def _tracked(frame: Frame, outcome: PictureOutcome, tracked: Tracked) -> Frame:
         tried=len(fine.seen.point),
         found=int(held.sum()),
         sigma=float(tracked.pose.sigma),
-        keyframe=outcome.mapped is not None,
+        keyframe=outcome.mapped is not None or outcome.queued,
         marks=marks,
     )
 
@@ -219,6 +242,8 @@ def _start_marks(attempt: Attempt) -> Marks:
 def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Frame:
     """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
     trails, start = done.system.trails, done.settings.start
+    if done.system.chosen is not None:
+        return frame if trails is None else frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
     if isinstance(outcome.attempt, Attempt):
         done.refused(outcome.attempt.reason)
     elif outcome.attempt is not None:
@@ -235,10 +260,12 @@ def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Fr
         done.refused(f"{moved}: a start is tried from {start.least_motion:g} px on")
     elif outcome.attempt is None:
         done.refused("corners were followed over too few pictures")
-    marks = Marks(
-        trails.now.astype(np.float32), trails.level.astype(np.uint8), trails.first.astype(np.float32)
-    )
-    return frame._replace(tried=len(trails.now), marks=marks)
+    return frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
+
+
+def _trail_marks(trails: Trails) -> Marks:
+    now, first = trails.now.astype(np.float32), trails.first.astype(np.float32)
+    return Marks(now, trails.level.astype(np.uint8), first)
 
 
 def path(run: Run, live: bool = False) -> tuple[IntArray, Array]:

@@ -9,18 +9,32 @@ module              holds
 ``look``            pyramid and corners of a picture
 ``trails``          before there is a map: corners followed from picture to picture
 ``start``           two pictures to a first map, or why not yet
+``chosen``          a start from two pictures that the user chose
 ``tracker``         the pose of every picture
 ``policy``          which pictures become keyframes
 ``mapper``          what happens to these
+``concurrent``      the same with the mapper in a thread of its own
 ``refine_camera``   the camera freed in the last adjustment
 ==================  ==============================================================================
 
 A system takes pictures; it opens no files and draws nothing.
 """
 
+from vslam_ref.systems.ptam.chosen import ChosenStart
+from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import STAGES, PictureOutcome, Pose, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
 
-__all__ = ["STAGES", "PictureOutcome", "Pose", "Ptam", "Quality", "Settings", "Tracked"]
+__all__ = [
+    "STAGES",
+    "ChosenStart",
+    "ConcurrentPtam",
+    "PictureOutcome",
+    "Pose",
+    "Ptam",
+    "Quality",
+    "Settings",
+    "Tracked",
+]

@@ -18,12 +18,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.support.stopwatch import Stopwatch, stage
 from vslam_ref.systems.ptam import trails as trail_steps
+from vslam_ref.systems.ptam.chosen import ChosenStart
 from vslam_ref.systems.ptam.look import prepare
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
 from vslam_ref.systems.ptam.policy import KeyframePolicy
@@ -74,6 +75,8 @@ class PictureOutcome(NamedTuple):
         If it became a keyframe.
     attempt : Attempt or str or None
         Of a start, if one was tried; a sentence where there was nothing to try.
+    queued : bool
+        Whether it was handed to a mapper in another thread, to become a keyframe.
     stages : mapping of str to float
         CPU time of the thread, seconds, by ``STAGES`` that had a part in it; together the whole step.
     """
@@ -82,6 +85,7 @@ class PictureOutcome(NamedTuple):
     tracked: Tracked | None = None
     mapped: MappedKeyframe | None = None
     attempt: Attempt | str | None = None
+    queued: bool = False
     stages: Mapping[str, float] = MappingProxyType({})
 
 
@@ -93,10 +97,13 @@ class Ptam:
     ----------
     camera : Camera
     settings : Settings, optional
+    chosen : ChosenStart, optional
+        Two pictures to start from; by default the system finds them.
     """
 
     camera: Camera
     settings: Settings = field(default_factory=Settings)
+    chosen: ChosenStart | None = None
 
     def __post_init__(self) -> None:
         s = self.settings
@@ -145,6 +152,8 @@ class Ptam:
     # --- before there is a map ----------------------------------------------------------------
 
     def _before_the_map(self, picture: PreparedPicture) -> PictureOutcome:
+        if self.chosen is not None:
+            return self._towards(self.chosen, picture)
         s, f = self.settings.start, self.settings.features
         if self.trails is not None:
             self.trails = trail_steps.go_on(self.trails, picture, s)
@@ -164,6 +173,13 @@ class Ptam:
             self.trails = self.trails.only(found.row[found.agrees], found.uv_b[found.agrees])
         return PictureOutcome(picture.number, attempt=found)
 
+    def _towards(self, chosen: ChosenStart, picture: PreparedPicture) -> PictureOutcome:
+        """Go on towards a start from two chosen pictures."""
+        self.trails, told = chosen.take(self.trails, picture, self.camera, self.settings, self.rng)
+        if told.attempt is not None and not told.reason:
+            self._start(told.attempt)
+        return PictureOutcome(picture.number, attempt=told.attempt or told.reason or None)
+
     def _start(self, found: Attempt) -> None:
         """Make the first map, and track the pictures between against it."""
         assert self.trails is not None
@@ -177,7 +193,7 @@ class Ptam:
         for picture in reversed(pictures[1:-1]):
             tracked = back.track(self.map, picture)
             if tracked.quality is not Quality.LOST:
-                self._note(picture, tracked, live=False)
+                self._note(self.map, picture, tracked, live=False)
         self.tracker = self._tracker(T_last)
         self.tracker.last = pictures[-1]
         self.trails = None
@@ -194,26 +210,23 @@ class Ptam:
         tracked = self.tracker.track(self.map, picture)
         mapped = None
         if tracked.quality is not Quality.LOST:
-            self._count(tracked)
-            self._note(picture, tracked, live=True)
+            self._count(self.map.points["tried"], self.map.points["found"], tracked)
+            self._note(self.map, picture, tracked, live=True)
             if self.policy.wants(self.map, tracked):
                 mapped = self._keyframe(picture, tracked)
         return PictureOutcome(picture.number, tracked, mapped)
 
-    def _count(self, tracked: Tracked) -> None:
-        """Remember of each point that it was looked for, and whether it was found."""
-        assert self.map is not None
-        seen, points = tracked.fine.seen.point, self.map.points
-        points["tried"][seen] += 1
-        points["found"][seen[tracked.fine.weights > 0]] += 1
+    def _count(self, tried: IntArray, found: IntArray, tracked: Tracked) -> None:
+        """Count for each point (N,) that it was looked for, and whether it was found."""
+        seen = tracked.fine.seen.point
+        tried[seen] += 1
+        found[seen[tracked.fine.weights > 0]] += 1
 
-    def _note(self, picture: PreparedPicture, tracked: Tracked, *, live: bool) -> None:
+    def _note(self, visual_map: VisualMap, picture: PreparedPicture, tracked: Tracked, *, live: bool) -> None:
         """Remember a pose relative to the keyframe nearest to it."""
-        assert self.map is not None
         T = tracked.T_cam_world
-        centres = camera_pose.centre_from_pose(self.map.T_kf_world)
-        kf = int(np.argmin(np.linalg.norm(centres - camera_pose.centre_from_pose(T), axis=1)))
-        T_cam_kf = se3.compose(T, se3.inverse(self.map.T_kf_world[kf]))
+        kf = nearest_keyframe(visual_map, T)
+        T_cam_kf = se3.compose(T, se3.inverse(visual_map.T_kf_world[kf]))
         self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
 
     def _keyframe(self, picture: PreparedPicture, tracked: Tracked) -> MappedKeyframe:
@@ -238,6 +251,9 @@ class Ptam:
         if self.settings.camera.refine:
             self.refined = refine_camera(self.map, self.settings)
 
+    def close(self) -> None:
+        """Leave nothing running; here there is nothing."""
+
     def trajectory(self) -> tuple[Array, Array]:
         """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""
         if self.map is None:
@@ -246,3 +262,9 @@ class Ptam:
         each = [self.poses[int(n)] for n in numbers]
         T = np.stack([se3.compose(p.T_cam_kf, self.map.T_kf_world[p.kf]) for p in each])
         return numbers, T
+
+
+def nearest_keyframe(visual_map: VisualMap, T_cam_world: Array) -> int:
+    """Number of the keyframe nearest to a pose (4, 4), by the centres in the map's own unit."""
+    centres = camera_pose.centre_from_pose(visual_map.T_kf_world)
+    return int(np.argmin(np.linalg.norm(centres - camera_pose.centre_from_pose(T_cam_world), axis=1)))

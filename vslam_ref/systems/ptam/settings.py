@@ -127,6 +127,12 @@ class MapperSettings:
     local_steps: int = assume(15, "", "of a local adjustment")
     global_every: int = assume(5, "keyframes", "an adjustment of everything")
     global_steps: int = assume(10, "", "of a global adjustment while pictures come")
+    lag: int = assume(
+        3, "pictures", "beside the tracker: it waits for a keyframe that was handed over so long ago"
+    )
+    queue: int = assume(
+        1, "keyframes", "beside the tracker, that wait at most: a second would find what the first finds"
+    )
     tries: int = assume(8, "looks", "after which a point must have been found often enough")
     found: float = assume(0.25, "share", "fewer: the point dies")
 
