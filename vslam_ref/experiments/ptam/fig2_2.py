@@ -3,6 +3,8 @@
 PTAM runs over the rendered desk, and tells of every picture which stages had a part in it.  The figure shows
 the stages of the two pipelines in their order, in how many pictures each took part, and how long it took.
 The claims compare with the figure of A: which stages every picture passes, and which only a keyframe.
+
+Implements A fig 2.2.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Drawn from a run over the rendered desk, where the true plane and the true poses
 third picture can be judged.  The plane's normal is compared with the desk's, and the house's feet must stay
 where they stand while the camera moves: as drawn, they must be pictures of fixed points of the world by the
 true poses.
+
+Implements A fig 2.3.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 PTAM runs over rendered scenes, an open one and a desk, on one thread with mapping in line.  Of every picture
 after the start the CPU seconds of the thread are kept, those of tracking (all stages but the mapper's) and
 the whole.  Rendering is not counted.  The times are this machine's, and differ a little from run to run.
+
+Implements A§2.3.
 """
 
 from __future__ import annotations
@@ -52,7 +54,7 @@ class FramerateConfig:
             )
 
 
-class Case(NamedTuple):
+class SceneOnBackend(NamedTuple):
     """A scene on a backend."""
 
     scene: str
@@ -73,17 +75,17 @@ def backends() -> list[str]:
     return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
 
 
-def cases(config: FramerateConfig) -> list[Case]:
+def cases(config: FramerateConfig) -> list[SceneOnBackend]:
     """Every scene on every backend."""
-    return [Case(name, backend) for name in config.scenes for backend in backends()]
+    return [SceneOnBackend(name, backend) for name in config.scenes for backend in backends()]
 
 
-def words(case: Case) -> str:
+def words(case: SceneOnBackend) -> str:
     """Name of a case."""
     return f"{case.scene}-{case.backend}"
 
 
-def simulate(config: FramerateConfig, case: Case, unit: None) -> FramerateRun:
+def simulate(config: FramerateConfig, case: SceneOnBackend, unit: None) -> FramerateRun:
     """Run over one scene on one backend."""
     made = scene(case.scene, config.seed, frames=config.pictures, effects=Effects(noise=config.noise))
     grey = [made.frame(k) for k in range(config.pictures)]

@@ -1,9 +1,9 @@
 """Mapping in line or beside: how late a pose comes when pictures come thirty times a second.
 
 The same pictures of the rendered desk are given to PTAM at the pace of a camera, in real time: once with
-mapping in line, once with the mapper in a thread of its own.  A picture's latency is from when the camera gave
-it to when its pose is there; a picture that has to wait for the one before it is late by that, too.  Latencies
-are this machine's, and need a second core that is idle; they differ from run to run.
+mapping in line, once with the mapper in a thread of its own.  A picture's latency is from when the camera
+gave it to when its pose is there; a picture that has to wait for the one before it is late by that, too.
+Latencies are this machine's, and need a second core that is idle; they differ from run to run.
 """
 
 from __future__ import annotations
