@@ -18,7 +18,7 @@ PALE = "#F2F2F2"
 WHITE = {"fc": "white", "ec": "none", "pad": 1.5}
 
 
-class Box(NamedTuple):
+class FlowBox(NamedTuple):
     """A stage, in how many pictures it had a part, and its median milliseconds (NaN: never)."""
 
     name: str
@@ -26,7 +26,9 @@ class Box(NamedTuple):
     ms: float
 
 
-def flow_figure(tracker: Sequence[Box], mapper: Sequence[Box], pictures: int, keyframes: int) -> Figure:
+def flow_figure(
+    tracker: Sequence[FlowBox], mapper: Sequence[FlowBox], pictures: int, keyframes: int
+) -> Figure:
     """Draw a loop: the tracker from left to right, the mapper below from right to left, and the map."""
     with style.house_style():
         figure, (panel,) = style.new_figure(4.0)
@@ -52,7 +54,7 @@ def flow_figure(tracker: Sequence[Box], mapper: Sequence[Box], pictures: int, ke
     return figure
 
 
-def _row(panel: Axes, boxes: Sequence[Box], y: float, colour: str, places: Sequence[int]) -> None:
+def _row(panel: Axes, boxes: Sequence[FlowBox], y: float, colour: str, places: Sequence[int]) -> None:
     for k, (box, place) in enumerate(zip(boxes, places, strict=True)):
         told = f"{box.pictures} times, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
         _box(panel, place * STEP, y, colour if box.pictures else PALE, box.name, told)

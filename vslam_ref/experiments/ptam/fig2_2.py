@@ -163,12 +163,14 @@ def series(study: Study[FlowRun]) -> dict[str, object]:
 
 def figure(study: Study[FlowRun]) -> Figure:
     """The two pipelines as boxes."""
-    from vslam_ref.plot.flow import Box, flow_figure
+    from vslam_ref.plot.flow import FlowBox, flow_figure
 
     run = study.once
 
-    def boxes(names: tuple[str, ...]) -> list[Box]:
-        return [Box(name, int(_part(run, name).sum()), float(run.ms[STAGES.index(name)])) for name in names]
+    def boxes(names: tuple[str, ...]) -> list[FlowBox]:
+        return [
+            FlowBox(name, int(_part(run, name).sum()), float(run.ms[STAGES.index(name)])) for name in names
+        ]
 
     return flow_figure(boxes(TRACKER), boxes(MAPPER), len(run.keyframe), int(run.keyframe.sum()))
 

@@ -55,7 +55,7 @@ class PartsConfig:
             raise ValueError(f"need at least one run, 80 pictures, and inputs of {', '.join(PART)}")
 
 
-class Variant(NamedTuple):
+class PartVariant(NamedTuple):
     """An input and a set of settings."""
 
     input: str
@@ -70,17 +70,17 @@ class PartsRun(NamedTuple):
     error: Array
 
 
-def variants(config: PartsConfig) -> list[Variant]:
+def variants(config: PartsConfig) -> list[PartVariant]:
     """On every input the whole system, without the part, and as published."""
-    return [Variant(name, p) for name in config.inputs for p in (WHOLE, PART[name][0], PUBLISHED)]
+    return [PartVariant(name, p) for name in config.inputs for p in (WHOLE, PART[name][0], PUBLISHED)]
 
 
-def words(variant: Variant) -> str:
+def words(variant: PartVariant) -> str:
     """Name of a variant."""
     return f"{variant.input}-{variant.preset}"
 
 
-def simulate(config: PartsConfig, variant: Variant, seed: np.random.SeedSequence) -> PartsRun:
+def simulate(config: PartsConfig, variant: PartVariant, seed: np.random.SeedSequence) -> PartsRun:
     """Run one variant over one seed's pictures."""
     sequence = pictures_of(variant.input, int(seed.generate_state(1)[0]), config.pictures, config.noise)
     settings = Settings() if variant.preset == WHOLE else preset(variant.preset)
