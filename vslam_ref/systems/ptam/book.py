@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.robust.scale import MAD_NORM_2D
 from vslam_ref.features.book import best_corner, warped_patch
+from vslam_ref.features.levels import Bytes
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview.two_views import book as two_views
@@ -36,12 +37,12 @@ FOLLOWED, TRIED = 200, 60
 # --- two pictures become a map ---
 
 
-def corners_of(picture: PreparedPicture, level: int, numbers: Array) -> list[mapper.Corner]:
+def corners_of(picture: PreparedPicture, level: int, numbers: IntArray) -> list[mapper.Corner]:
     """Corners (n,) of a level, as pairs of whole numbers of its pixels."""
     return [(int(x), int(y)) for x, y in picture.corners[level].xy[numbers]]
 
 
-def alike_near(picture: PreparedPicture, T: Array, u: Array) -> mapper.Corner | None:
+def alike_near(picture: PreparedPicture, T: Bytes, u: Array) -> mapper.Corner | None:
     """Corner of level 0 near u (2,), pixels, that looks most like a patch."""
     radius = S.start.search_radius
     close = np.flatnonzero((np.abs(picture.corners[0].xy - u) <= radius).all(1))
@@ -98,12 +99,15 @@ def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Genera
     x_a, x_b = (np.array([[*camera.unproject(pair[k]).xn, 1] for pair in kept]) for k in (0, 1))
     sigma = 1 / camera.params[0]
     made = PlainMap(camera, [np.eye(4), motion(x_a, x_b, sigma, rng)], [first, pictures[-1]])
-    for places, cost in zip(kept, costs(made.poses[1], x_a, x_b, sigma), strict=True):
+    fits = [p for p, c in zip(kept, costs(made.poses[1], x_a, x_b, sigma), strict=True) if c < 3.84]
+    for places in fits:
         X = triangulated(made, 0, 1, 0, places)
-        if X is not None and cost < 3.84:
+        if X is not None:
             made.add(X, 0, 1, 0, places)
+    if len(made.X) < S.start.wide_points:
+        return "too few points have parallax"
     adjust(made, {1}, set(made.X))
-    parallax = [np.degrees(angle(made, X, 0, 1)) for X in made.X.values()]
+    parallax = [angle(camera, made.poses[1], places) for places in fits]
     cost = float(np.mean(costs(made.poses[1], x_a, x_b, sigma)))
     reason = missing(parallax, cost, [X[2] for X in made.X.values()], S.start)
     if reason:
@@ -119,21 +123,23 @@ def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Genera
 # --- a keyframe makes the map better ---
 
 
-def angle(made: PlainMap, X: Array, a: int, b: int) -> float:
-    """Parallax of a point X (3,), own unit, between two keyframes, radians."""
-    p, q = (X - camera_pose.centre_from_pose(made.poses[k]) for k in (a, b))
-    return float(np.arctan2(np.linalg.norm(np.cross(p, q)), p @ q))
+def angle(camera: Camera, T_b_a: Array, places: tuple[Array, Array]) -> float:
+    """Parallax of two pixels, degrees: the angle between their rays."""
+    a, b = (camera.unproject(u).bearing for u in places)
+    a = T_b_a[:3, :3] @ a
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
 def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array, Array]) -> Array | None:
     """Point (3,), own unit, of a match in keyframes a and b, pixels; None without depth, or off both."""
     T_b_a = made.poses[b] @ se3.inverse(made.poses[a])
+    if angle(made.camera, T_b_a, places) < S.mapper.parallax:
+        return None
     X_a = mapper.triangulate(made.camera, places[0], places[1], T_b_a, 1.0).X_a
     at = made.camera.project(np.stack([X_a, se3.act(T_b_a, X_a)]))
     off = np.sqrt(np.mean(np.sum((at.uv - places) ** 2, 1)))
-    X = se3.act(se3.inverse(made.poses[a]), X_a)
-    deep = np.degrees(angle(made, X, a, b)) >= S.mapper.parallax
-    return X if at.valid.all() and off <= 2.0 * 2**level and deep else None
+    X: Array = se3.act(se3.inverse(made.poses[a]), X_a)
+    return X if at.valid.all() and off <= 2.0 * 2**level else None
 
 
 def partner(made: PlainMap, kf: int) -> int:

@@ -107,10 +107,10 @@ def problem(made: PlainMap, keys: list[tuple[int, int]], active: set[int], sigma
     )
     seen = [made.sightings[key] for key in keys]
     observed = Observations(
-        [views.index(k) for k, _ in keys],
-        [numbers.index(p) for _, p in keys],
-        [at.u for at in seen],
-        [(sigma * 2**at.level) ** 2 * np.eye(2) for at in seen],
+        np.array([views.index(k) for k, _ in keys]),
+        np.array([numbers.index(p) for _, p in keys]),
+        np.stack([at.u for at in seen]),
+        np.stack([(sigma * 2**at.level) ** 2 * np.eye(2) for at in seen]),
     )
     model = type(made.camera)
     free = freedom(model, scene, fixed_views=[i for i, k in enumerate(views) if k not in active])
