@@ -65,7 +65,7 @@ def trail(pictures: list[PreparedPicture], corner: mapper.Corner) -> Array | Non
 
 
 def costs(T: Array, x_a: Array, x_b: Array, sigma: float) -> list[float]:
-    """Squared distance of each pair ``x (N, 3)`` from a motion (4, 4), in sigma^2; of wrong ones 3.84."""
+    """Squared distances of pairs ``x_a (N, 3)``, ``x_b (N, 3)`` from a motion (4, 4), in sigma^2, up to 3.84."""
     t = T[:3, 3] / np.linalg.norm(T[:3, 3])
     each = [two_views.cost(T[:3, :3], t, a, b) for a, b in zip(x_a, x_b, strict=True)]
     return [min(c / sigma**2, 3.84) for c in each]  # eq-msac
@@ -124,10 +124,10 @@ def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Genera
 
 
 def angle(camera: Camera, T_b_a: Array, places: tuple[Array, Array]) -> float:
-    """Parallax of two pixels, degrees: the angle between their rays."""
+    """Parallax, degrees, of two pixels ``places`` (2,) at a motion ``T_b_a (4, 4)``: angle of their rays."""
     a, b = (camera.unproject(u).bearing for u in places)
     a = T_b_a[:3, :3] @ a
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))  # eq-parallax
 
 
 def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array, Array]) -> Array | None:
@@ -135,7 +135,7 @@ def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array
     T_b_a = made.poses[b] @ se3.inverse(made.poses[a])
     if angle(made.camera, T_b_a, places) < S.mapper.parallax:
         return None
-    X_a = mapper.triangulate(made.camera, places[0], places[1], T_b_a, 1.0).X_a
+    X_a = mapper.triangulate(made.camera, *places, T_b_a, 1.0).X_a  # eq-triangulation-optimal
     at = made.camera.project(np.stack([X_a, se3.act(T_b_a, X_a)]))
     off = np.sqrt(np.mean(np.sum((at.uv - places) ** 2, 1)))
     X: Array = se3.act(se3.inverse(made.poses[a]), X_a)
@@ -145,7 +145,7 @@ def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array
 def partner(made: PlainMap, kf: int) -> int:
     """Keyframe to triangulate with: of those that share many points, the nearest with a base line."""
     seen, base = made.seen(), 0.02 * made.depth(kf)
-    shared = {k: len(seen[k] & seen[kf]) for k in seen if k != kf}
+    shared = {k: len(seen[k] & seen[kf]) for k in seen if k != kf}  # eq-covisibility
     c = camera_pose.centre_from_pose(np.stack(made.poses))
     away = {k: float(np.linalg.norm(c[k] - c[kf])) for k in shared if shared[k] >= 0.3 * max(shared.values())}
     return min(away, key=lambda k: (away[k] < base, away[k]))
@@ -284,6 +284,6 @@ def now(
 ) -> mapper.Now:
     """What the choice of keyframes asks of a tracked picture at T (4, 4); the way in the map's own unit."""
     at = {p: made.camera.pixel_from_world(T, made.X[p]).uv for p in seen}
-    size = [np.hypot(*(at[p] - s.u)) / 2**s.level for p, s in seen.items()]
+    size = [np.hypot(*(at[p] - s.u)) / 2**s.level for p, s in seen.items()]  # eq-a2-7
     depth = float(np.median([se3.act(T, made.X[p])[2] for p in seen]))
     return mapper.Now(since, len(seen), best, MAD_NORM_2D * float(np.median(size)), away / depth)

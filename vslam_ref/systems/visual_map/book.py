@@ -35,7 +35,7 @@ class Sighting(NamedTuple):
 
 @dataclass
 class PlainMap:
-    """Keyframes in a list; points by number; sightings by keyframe and point; looks at a point, and finds."""
+    """Keyframes: poses (4, 4), pictures.  By number X (3,), own unit, looks and finds.  Who saw whom."""
 
     camera: Camera
     poses: list[Array] = field(default_factory=list)
@@ -110,7 +110,7 @@ def problem(made: PlainMap, keys: list[tuple[int, int]], active: set[int], sigma
         np.array([views.index(k) for k, _ in keys]),
         np.array([numbers.index(p) for _, p in keys]),
         np.stack([at.u for at in seen]),
-        np.stack([(sigma * 2**at.level) ** 2 * np.eye(2) for at in seen]),
+        np.stack([(sigma * 2**at.level) ** 2 * np.eye(2) for at in seen]),  # eq-level-sigma
     )
     model = type(made.camera)
     free = freedom(model, scene, fixed_views=[i for i, k in enumerate(views) if k not in active])
