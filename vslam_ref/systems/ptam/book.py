@@ -65,7 +65,7 @@ def trail(pictures: list[PreparedPicture], corner: mapper.Corner) -> Array | Non
 
 
 def costs(T: Array, x_a: Array, x_b: Array, sigma: float) -> list[float]:
-    """Squared distances of pairs ``x_a (N, 3)``, ``x_b (N, 3)`` from a motion (4, 4), in sigma^2, up to 3.84."""
+    """Squared distances of pairs ``x_a (N, 3)``, ``x_b (N, 3)`` from a motion (4, 4), sigma^2, to 3.84."""
     t = T[:3, 3] / np.linalg.norm(T[:3, 3])
     each = [two_views.cost(T[:3, :3], t, a, b) for a, b in zip(x_a, x_b, strict=True)]
     return [min(c / sigma**2, 3.84) for c in each]  # eq-msac
