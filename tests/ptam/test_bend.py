@@ -12,7 +12,7 @@ from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.worlds import bends
 
 
-def map_of(seen: bends.Drive, camera: Pinhole, free: tuple[str, ...] = ()) -> Scene:
+def map_of(seen: bends.SeenDrive, camera: Pinhole, free: tuple[str, ...] = ()) -> Scene:
     """The best map of exact pixels with a camera, its first view held."""
     view, point = np.nonzero(seen.seen)
     scene = Scene(seen.T_cam_world, seen.X_world, camera.params[None])
@@ -25,7 +25,7 @@ def steps(T: Array) -> Array:
     return np.asarray(np.linalg.norm(np.diff(camera_pose.centre_from_pose(T), axis=0), axis=1))
 
 
-def growth(scene: Scene, seen: bends.Drive) -> float:
+def growth(scene: Scene, seen: bends.SeenDrive) -> float:
     """Logarithm of the scale of the last 25 steps over that of the first 25."""
     ratio = steps(scene.T_cam_world) / steps(seen.T_cam_world)
     return float(np.log(ratio[-25:].mean() / ratio[:25].mean()))
@@ -74,7 +74,7 @@ def test_a_camera_that_is_free_finds_itself() -> None:
 
 
 def test_what_a_turn_does_not_show_it_does_not_spoil() -> None:
-    """A world that is stretched along the axis of the turn looks right: fy may be anything, the scale stays."""
+    """A world stretched along the axis of the turn looks right: fy may be anything, the scale stays."""
     seen = bends.drive(np.random.default_rng(1), np.pi / 2)
     found = map_of(seen, Pinhole(707.0, 717.0, 600.0, 180.0))
     assert abs(growth(found, seen)) < 1e-3

@@ -133,7 +133,9 @@ def as_plain(made: VisualMap) -> plain_maps.PlainMap:
     for row in np.flatnonzero(seen["on"]):
         kf, p = int(seen["kf"][row]), int(seen["point"][row])
         first = kf == table["source_kf"][p]
-        found.sightings[kf, p] = plain_maps.Sighting(seen["uv"][row], int(seen["level"][row]), bool(first))
+        found.sightings[kf, p] = plain_maps.PlainSighting(
+            seen["uv"][row], int(seen["level"][row]), bool(first)
+        )
     return found
 
 

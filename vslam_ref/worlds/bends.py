@@ -32,7 +32,7 @@ NEAR, FAR = 2.0, 35.0
 LEAST_VIEWS = 3
 
 
-class Drive(NamedTuple):
+class SeenDrive(NamedTuple):
     """What was driven and seen.
 
     Attributes
@@ -56,7 +56,7 @@ class Drive(NamedTuple):
     seen: BoolArray
 
 
-def drive(rng: np.random.Generator, angle: float, radius: float = 12.0, points: int = 1500) -> Drive:
+def drive(rng: np.random.Generator, angle: float, radius: float = 12.0, points: int = 1500) -> SeenDrive:
     """Drive round a bend.
 
     Parameters
@@ -72,7 +72,7 @@ def drive(rng: np.random.Generator, angle: float, radius: float = 12.0, points: 
 
     Returns
     -------
-    Drive
+    SeenDrive
 
     Examples
     --------
@@ -90,7 +90,7 @@ def drive(rng: np.random.Generator, angle: float, radius: float = 12.0, points: 
     Z = se3.act(T[:, None], X[None])[..., 2]
     seen = at.valid & (at.uv >= 0).all(-1) & (at.uv <= np.array(SIZE) - 1).all(-1) & (Z > NEAR) & (Z < FAR)
     often = seen.sum(0) >= LEAST_VIEWS
-    return Drive(T, way, (STRAIGHT, STRAIGHT + length), X[often], at.uv[:, often], seen[:, often])
+    return SeenDrive(T, way, (STRAIGHT, STRAIGHT + length), X[often], at.uv[:, often], seen[:, often])
 
 
 def _places(way: Array, heading: Array) -> Array:
@@ -113,4 +113,5 @@ def _beside(rng: np.random.Generator, place: Array, points: int) -> Array:
     near = place[rng.integers(0, len(place), points)] + rng.uniform(-25.0, 25.0, (points, 2))
     X = np.stack([near[:, 0], rng.uniform(-5.0, 1.6, points), near[:, 1]], 1)
     away = np.linalg.norm(near[:, None] - place[None], axis=2).min(axis=1)
-    return X[away > 3.5]
+    beside: Array = X[away > 3.5]
+    return beside

@@ -28,7 +28,7 @@ from vslam_ref.systems.ptam.mapper import book as mapper
 from vslam_ref.systems.ptam.settings import Settings, StartSettings
 from vslam_ref.systems.ptam.tracker import book as tracker
 from vslam_ref.systems.visual_map import PreparedPicture
-from vslam_ref.systems.visual_map.book import PlainMap, Sighting, adjust
+from vslam_ref.systems.visual_map.book import PlainMap, PlainSighting, adjust
 
 S = Settings()
 FOLLOWED, TRIED = 200, 60
@@ -203,10 +203,10 @@ def look_in(made: PlainMap, kf: int, wanted: set[int]) -> None:
     for s in tracker.visible(made.camera, points, made.poses[kf], made.pictures[kf]):
         u = tracker.find(s, made.pictures[kf], S.mapper.look_radius)
         if u is not None:
-            made.sightings[kf, number[id(s.point)]] = Sighting(u, s.level)
+            made.sightings[kf, number[id(s.point)]] = PlainSighting(u, s.level)
 
 
-def keyframe(made: PlainMap, picture: PreparedPicture, T: Array, seen: dict[int, Sighting]) -> None:
+def keyframe(made: PlainMap, picture: PreparedPicture, T: Array, seen: dict[int, PlainSighting]) -> None:
     """Take a picture with its pose (4, 4), own unit, and what it saw; make the map better by it."""
     s, kf = S.mapper, len(made.poses)
     made.poses.append(T)
@@ -266,7 +266,7 @@ def run(
     return PlainRun(made, {n: T @ made.poses[kf] for n, (kf, T) in kept.items()}, words)
 
 
-def counted(made: PlainMap, done: tracker.TwoPasses) -> dict[int, Sighting]:
+def counted(made: PlainMap, done: tracker.TwoPasses) -> dict[int, PlainSighting]:
     """What a tracked picture saw, by the points' numbers; each look is counted, and each find."""
     number = {id(X): p for p, X in made.X.items()}
     seen = {}
@@ -275,12 +275,12 @@ def counted(made: PlainMap, done: tracker.TwoPasses) -> dict[int, Sighting]:
         made.tried[p] += 1
         if u is not None and w > 0:
             made.found[p] += 1
-            seen[p] = Sighting(u, s.level)
+            seen[p] = PlainSighting(u, s.level)
     return seen
 
 
 def now(
-    made: PlainMap, T: Array, seen: dict[int, Sighting], since: int, best: int, away: float
+    made: PlainMap, T: Array, seen: dict[int, PlainSighting], since: int, best: int, away: float
 ) -> mapper.Now:
     """What the choice of keyframes asks of a tracked picture at T (4, 4); the way in the map's own unit."""
     at = {p: made.camera.pixel_from_world(T, made.X[p]).uv for p in seen}

@@ -25,7 +25,7 @@ FLOOR = 0.4
 """Pixels of the level: the scale of the errors is at least this."""
 
 
-class Sighting(NamedTuple):
+class PlainSighting(NamedTuple):
     """Place u (2,) in pixels of level 0, the level on which it was found, whether it is the point's first."""
 
     u: Array
@@ -41,7 +41,7 @@ class PlainMap:
     poses: list[Array] = field(default_factory=list)
     pictures: list[PreparedPicture] = field(default_factory=list)
     X: dict[int, Array] = field(default_factory=dict)
-    sightings: dict[tuple[int, int], Sighting] = field(default_factory=dict)
+    sightings: dict[tuple[int, int], PlainSighting] = field(default_factory=dict)
     tried: dict[int, int] = field(default_factory=dict)
     found: dict[int, int] = field(default_factory=dict)
 
@@ -57,8 +57,8 @@ class PlainMap:
         """Take in a point X (3,), own unit, seen first in keyframe a, then in b, at two pixels (2,)."""
         p = len(self.tried)  # never the number of another, dead or alive
         self.X[p], self.tried[p], self.found[p] = X, 0, 0
-        self.sightings[a, p] = Sighting(places[0], level, first=True)
-        self.sightings[b, p] = Sighting(places[1], level)
+        self.sightings[a, p] = PlainSighting(places[0], level, first=True)
+        self.sightings[b, p] = PlainSighting(places[1], level)
         return p
 
     def drop(self, p: int) -> None:
