@@ -28,7 +28,7 @@ PICTURES = 15
 
 
 @pytest.fixture(scope="module")
-def plain(film: Film) -> book.PlainRun:
+def plain(film: Film) -> book.BookRun:
     """Fifteen pictures in plain loops, begun with 0 and 7: ten seconds, the only whole run of the book."""
     pictures = [prepare(k, film.pictures[k], book.S.features) for k in range(PICTURES)]
     done = book.run(film.camera, pictures, 7, np.random.default_rng(0))
@@ -53,7 +53,7 @@ def centres(T: Array) -> Array:
     return np.asarray(camera_pose.centre_from_pose(T))
 
 
-def test_the_path_is_the_true_one_and_that_of_the_system(film: Film, plain: book.PlainRun) -> None:
+def test_the_path_is_the_true_one_and_that_of_the_system(film: Film, plain: book.BookRun) -> None:
     """Twice the deviation that the errors of the sightings explain, in metres.
 
     The deviations come from three directions or more, and a mean square of three standard numbers is above
@@ -78,7 +78,7 @@ def test_the_path_is_the_true_one_and_that_of_the_system(film: Film, plain: book
     assert apart < 2 * both
 
 
-def test_poses_turn_as_the_camera_did(film: Film, plain: book.PlainRun) -> None:
+def test_poses_turn_as_the_camera_did(film: Film, plain: book.BookRun) -> None:
     """From the first to the last picture, to half a degree: 0.5 px of 256 are 0.1, and a start is vague."""
     last = PICTURES - 1
     true = se3.compose(film.T_cam_world[last], se3.inverse(film.T_cam_world[0]))
@@ -87,7 +87,7 @@ def test_poses_turn_as_the_camera_did(film: Film, plain: book.PlainRun) -> None:
     assert np.degrees(np.linalg.norm(se3.log(true)[3:])) > 2
 
 
-def test_a_keyframe_was_made_and_the_map_is_whole(plain: book.PlainRun) -> None:
+def test_a_keyframe_was_made_and_the_map_is_whole(plain: book.BookRun) -> None:
     made = plain.map
     assert len(made.poses) >= 3
     assert np.array_equal(plain.path[0], np.eye(4))
@@ -124,16 +124,16 @@ def test_a_camera_that_only_turns_does_not_start() -> None:
     assert told == "too few points have parallax"
 
 
-def as_plain(made: VisualMap) -> plain_maps.PlainMap:
+def as_plain(made: VisualMap) -> plain_maps.BookMap:
     """The same map in dictionaries, without pictures."""
-    found = plain_maps.PlainMap(made.camera, list(made.T_kf_world))
+    found = plain_maps.BookMap(made.camera, list(made.T_kf_world))
     table, seen = made.points, made.sightings
     found.tried, found.found = (dict(enumerate(table[name].tolist())) for name in ("tried", "found"))
     found.X = {p: table["X_world"][p] for p in np.flatnonzero(table["alive"]).tolist()}
     for row in np.flatnonzero(seen["on"]):
         kf, p = int(seen["kf"][row]), int(seen["point"][row])
         first = kf == table["source_kf"][p]
-        found.sightings[kf, p] = plain_maps.PlainSighting(
+        found.sightings[kf, p] = plain_maps.BookSighting(
             seen["uv"][row], int(seen["level"][row]), bool(first)
         )
     return found
@@ -170,7 +170,7 @@ def test_what_ends_with_a_sighting(film: Film) -> None:
 def test_a_match_with_depth_is_a_point(film: Film) -> None:
     """Exact sightings of exact points give these; without parallax, or behind a camera, there is none."""
     T = np.stack([np.eye(4), se3.exp([-0.1, 0.02, 0.03, 0.02, -0.05, 0.01])])
-    made = plain_maps.PlainMap(film.camera, list(T))
+    made = plain_maps.BookMap(film.camera, list(T))
     for X in np.array([[0.1, 0.1, 1.0], [-0.2, 0.1, 3.0], [0.3, -0.2, 2.0]]):
         uv = [film.camera.pixel_from_world(pose, X).uv for pose in T]
         found = book.triangulated(made, 0, 1, 0, (uv[0], uv[1]))

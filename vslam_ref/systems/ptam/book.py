@@ -28,7 +28,7 @@ from vslam_ref.systems.ptam.mapper import book as mapper
 from vslam_ref.systems.ptam.settings import Settings, StartSettings
 from vslam_ref.systems.ptam.tracker import book as tracker
 from vslam_ref.systems.visual_map import PreparedPicture
-from vslam_ref.systems.visual_map.book import PlainMap, PlainSighting, adjust
+from vslam_ref.systems.visual_map.book import BookMap, BookSighting, adjust
 
 S = Settings()
 FOLLOWED, TRIED = 200, 60
@@ -90,7 +90,7 @@ def missing(parallax: list[float], cost: float, depths: list[float], s: StartSet
     return "" if far >= s.depth_spread * near else "the depths are too much alike"  # eq-start-accepted
 
 
-def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Generator) -> PlainMap | str:
+def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Generator) -> BookMap | str:
     """First map, its median depth 1, from the first and the last picture; or why not."""
     first = pictures[0]
     strong = corners_of(first, 0, look.strong_corners(first, 0, S.features)[:FOLLOWED])
@@ -98,7 +98,7 @@ def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Genera
     kept = [(a, b) for a, b in ends if b is not None]
     x_a, x_b = (np.array([[*camera.unproject(pair[k]).xn, 1] for pair in kept]) for k in (0, 1))
     sigma = 1 / camera.params[0]
-    made = PlainMap(camera, [np.eye(4), motion(x_a, x_b, sigma, rng)], [first, pictures[-1]])
+    made = BookMap(camera, [np.eye(4), motion(x_a, x_b, sigma, rng)], [first, pictures[-1]])
     fits = [p for p, c in zip(kept, costs(made.poses[1], x_a, x_b, sigma), strict=True) if c < 3.84]
     for places in fits:
         X = triangulated(made, 0, 1, 0, places)
@@ -130,7 +130,7 @@ def angle(camera: Camera, T_b_a: Array, places: tuple[Array, Array]) -> float:
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))  # eq-parallax
 
 
-def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array, Array]) -> Array | None:
+def triangulated(made: BookMap, a: int, b: int, level: int, places: tuple[Array, Array]) -> Array | None:
     """Point (3,), own unit, of a match in keyframes a and b, pixels; None without depth, or off both."""
     T_b_a = made.poses[b] @ se3.inverse(made.poses[a])
     if angle(made.camera, T_b_a, places) < S.mapper.parallax:
@@ -142,7 +142,7 @@ def triangulated(made: PlainMap, a: int, b: int, level: int, places: tuple[Array
     return X if at.valid.all() and off <= 2.0 * 2**level else None
 
 
-def partner(made: PlainMap, kf: int) -> int:
+def partner(made: BookMap, kf: int) -> int:
     """Keyframe to triangulate with: of those that share many points, the nearest with a base line."""
     seen, base = made.seen(), 0.02 * made.depth(kf)
     shared = {k: len(seen[k] & seen[kf]) for k in seen if k != kf}  # eq-covisibility
@@ -151,7 +151,7 @@ def partner(made: PlainMap, kf: int) -> int:
     return min(away, key=lambda k: (away[k] < base, away[k]))
 
 
-def new_points(made: PlainMap, kf: int) -> set[int]:
+def new_points(made: BookMap, kf: int) -> set[int]:
     """Points of strong corners that nothing explains yet: on the curve, found back, with depth."""
     f, other, new = S.features, partner(made, kf), set()
     T_other_kf = made.poses[other] @ se3.inverse(made.poses[kf])
@@ -185,7 +185,7 @@ def matched(
     return mapper.level_zero(corner, a.level), 2**b.level * u_b + (2**b.level - 1) / 2  # eq-level-position
 
 
-def as_tracked(made: PlainMap, wanted: set[int]) -> list[tracker.Point]:
+def as_tracked(made: BookMap, wanted: set[int]) -> list[tracker.Point]:
     """Points as the tracker wants them, in the order of their numbers: each with its first picture."""
     first = {p: (kf, at) for (kf, p), at in made.sightings.items() if at.first}
     return [
@@ -195,7 +195,7 @@ def as_tracked(made: PlainMap, wanted: set[int]) -> list[tracker.Point]:
     ]
 
 
-def look_in(made: PlainMap, kf: int, wanted: set[int]) -> None:
+def look_in(made: BookMap, kf: int, wanted: set[int]) -> None:
     """Look in a keyframe for points that it does not see yet, where they should be."""
     left = wanted - made.seen()[kf]
     points = as_tracked(made, left)
@@ -203,10 +203,10 @@ def look_in(made: PlainMap, kf: int, wanted: set[int]) -> None:
     for s in tracker.visible(made.camera, points, made.poses[kf], made.pictures[kf]):
         u = tracker.find(s, made.pictures[kf], S.mapper.look_radius)
         if u is not None:
-            made.sightings[kf, number[id(s.point)]] = PlainSighting(u, s.level)
+            made.sightings[kf, number[id(s.point)]] = BookSighting(u, s.level)
 
 
-def keyframe(made: PlainMap, picture: PreparedPicture, T: Array, seen: dict[int, PlainSighting]) -> None:
+def keyframe(made: BookMap, picture: PreparedPicture, T: Array, seen: dict[int, BookSighting]) -> None:
     """Take a picture with its pose (4, 4), own unit, and what it saw; make the map better by it."""
     s, kf = S.mapper, len(made.poses)
     made.poses.append(T)
@@ -228,17 +228,17 @@ def keyframe(made: PlainMap, picture: PreparedPicture, T: Array, seen: dict[int,
 # --- the whole run ---
 
 
-class PlainRun(NamedTuple):
+class BookRun(NamedTuple):
     """The map; T_cam_world (4, 4), in the map's unit, of each picture that has one; what was said of each."""
 
-    map: PlainMap
+    map: BookMap
     path: dict[int, Array]
     words: dict[int, str]
 
 
 def run(
     camera: Camera, pictures: list[PreparedPicture], last: int, rng: np.random.Generator
-) -> PlainRun | str:
+) -> BookRun | str:
     """Start from pictures 0 and ``last`` of a list; then track one after the other, and map in between."""
     made = begin(camera, pictures[: last + 1], rng)
     if isinstance(made, str):
@@ -263,10 +263,10 @@ def run(
             kept[picture.number], T = (len(made.poses) - 1, np.eye(4)), made.poses[-1]
             since = best = 0
     adjust(made, set(range(1, len(made.poses))), set(made.X))
-    return PlainRun(made, {n: T @ made.poses[kf] for n, (kf, T) in kept.items()}, words)
+    return BookRun(made, {n: T @ made.poses[kf] for n, (kf, T) in kept.items()}, words)
 
 
-def counted(made: PlainMap, done: tracker.TwoPasses) -> dict[int, PlainSighting]:
+def counted(made: BookMap, done: tracker.TwoPasses) -> dict[int, BookSighting]:
     """What a tracked picture saw, by the points' numbers; each look is counted, and each find."""
     number = {id(X): p for p, X in made.X.items()}
     seen = {}
@@ -275,12 +275,12 @@ def counted(made: PlainMap, done: tracker.TwoPasses) -> dict[int, PlainSighting]
         made.tried[p] += 1
         if u is not None and w > 0:
             made.found[p] += 1
-            seen[p] = PlainSighting(u, s.level)
+            seen[p] = BookSighting(u, s.level)
     return seen
 
 
 def now(
-    made: PlainMap, T: Array, seen: dict[int, PlainSighting], since: int, best: int, away: float
+    made: BookMap, T: Array, seen: dict[int, BookSighting], since: int, best: int, away: float
 ) -> mapper.Now:
     """What the choice of keyframes asks of a tracked picture at T (4, 4); the way in the map's own unit."""
     at = {p: made.camera.pixel_from_world(T, made.X[p]).uv for p in seen}

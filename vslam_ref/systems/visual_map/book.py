@@ -25,7 +25,7 @@ FLOOR = 0.4
 """Pixels of the level: the scale of the errors is at least this."""
 
 
-class PlainSighting(NamedTuple):
+class BookSighting(NamedTuple):
     """Place u (2,) in pixels of level 0, the level on which it was found, whether it is the point's first."""
 
     u: Array
@@ -34,14 +34,14 @@ class PlainSighting(NamedTuple):
 
 
 @dataclass
-class PlainMap:
+class BookMap:
     """Keyframes: poses (4, 4), pictures.  By number X (3,), own unit, looks and finds.  Who saw whom."""
 
     camera: Camera
     poses: list[Array] = field(default_factory=list)
     pictures: list[PreparedPicture] = field(default_factory=list)
     X: dict[int, Array] = field(default_factory=dict)
-    sightings: dict[tuple[int, int], PlainSighting] = field(default_factory=dict)
+    sightings: dict[tuple[int, int], BookSighting] = field(default_factory=dict)
     tried: dict[int, int] = field(default_factory=dict)
     found: dict[int, int] = field(default_factory=dict)
 
@@ -57,8 +57,8 @@ class PlainMap:
         """Take in a point X (3,), own unit, seen first in keyframe a, then in b, at two pixels (2,)."""
         p = len(self.tried)  # never the number of another, dead or alive
         self.X[p], self.tried[p], self.found[p] = X, 0, 0
-        self.sightings[a, p] = PlainSighting(places[0], level, first=True)
-        self.sightings[b, p] = PlainSighting(places[1], level)
+        self.sightings[a, p] = BookSighting(places[0], level, first=True)
+        self.sightings[b, p] = BookSighting(places[1], level)
         return p
 
     def drop(self, p: int) -> None:
@@ -74,7 +74,7 @@ class PlainMap:
                 self.drop(p)
 
 
-def adjust(made: PlainMap, active: set[int], points: set[int]) -> None:
+def adjust(made: BookMap, active: set[int], points: set[int]) -> None:
     """Move keyframes and points to where the sightings agree best; take back those that do not."""
     keys = [key for key in sorted(made.sightings) if key[1] in points]
     for _ in range(2):  # the second time with the scale of what is left
@@ -90,14 +90,14 @@ def adjust(made: PlainMap, active: set[int], points: set[int]) -> None:
             made.take_back(*key)
 
 
-def size(made: PlainMap, kf: int, p: int) -> float:
+def size(made: BookMap, kf: int, p: int) -> float:
     """Error of a sighting in pixels of its level; infinite behind the camera."""
     seen = made.sightings[kf, p]
     at = made.camera.pixel_from_world(made.poses[kf], made.X[p])
     return float(np.hypot(*(at.uv - seen.u))) / 2**seen.level if at.valid else np.inf  # eq-a2-7
 
 
-def problem(made: PlainMap, keys: list[tuple[int, int]], active: set[int], sigma: float) -> BundleProblem:
+def problem(made: BookMap, keys: list[tuple[int, int]], active: set[int], sigma: float) -> BundleProblem:
     """Sightings as a problem of bundle adjustment: some keyframes move; sigma is in pixels of the level."""
     views, numbers = sorted({k for k, _ in keys}), sorted({p for _, p in keys})
     scene = Scene(
