@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -59,32 +59,39 @@ def starts_figure(
     return figure
 
 
+class Limits(Protocol):
+    """Shares of the points tried: above ``good`` a picture is good, below ``lost`` it is lost."""
+
+    @property
+    def good(self) -> float:
+        """No unit."""
+
+    @property
+    def lost(self) -> float:
+        """No unit."""
+
+
 def course_figure(
-    number: ArrayLike, tried: ArrayLike, found: ArrayLike, sigma: ArrayLike, keyframes: ArrayLike
+    number: ArrayLike, tried: ArrayLike, found: ArrayLike, limits: Limits, keyframes: ArrayLike
 ) -> Figure:
-    """Points tried and found, and the scale of the errors, over the pictures; triangles are keyframes."""
-    k = np.asarray(number)
+    """Points tried and found over the pictures, and the share of them; triangles are keyframes."""
+    k, made = np.asarray(number), np.asarray(keyframes)
     with style.house_style():
         figure, (left, right) = style.new_figure(3.2, 2)
         left.plot(k, np.asarray(tried), color=style.GREY, label="looked for")
         left.plot(k, np.asarray(found), color=style.BLUE, label="found, with weight")
-        right.plot(k, np.asarray(sigma), color=style.PURPLE)
+        right.plot(k, np.asarray(found) / np.asarray(tried), color=style.BLUE)
+        right.axhline(limits.good, color=style.ORANGE, ls="--", label="below: poor")
+        right.axhline(limits.lost, color=style.VERMILION, ls=":", label="below: lost")
         for axes in (left, right):
-            axes.plot(
-                np.asarray(keyframes),
-                np.zeros(len(np.asarray(keyframes))),
-                "^",
-                color=style.VERMILION,
-                ms=7,
-                label="keyframe",
-                clip_on=False,
-                zorder=5,
-            )
+            nought = np.zeros(len(made))
+            axes.plot(made, nought, "^", color=style.PURPLE, ms=7, label="keyframe", clip_on=False, zorder=5)
             axes.set_xlabel("number of the picture")
             axes.set_ylim(bottom=0)
         left.set_ylabel("points")
-        right.set_ylabel("scale of the errors [px of the level]")
+        right.set(ylabel="share found", ylim=(0, 1.05))
         left.legend()
+        right.legend()
     return figure
 
 
@@ -104,6 +111,7 @@ def paths_figure(truth: ArrayLike, paths: Mapping[str, ArrayLike], unit: str = "
         above.set_aspect("equal", adjustable="datalim")
         off.set(xlabel="picture with a pose", ylabel=f"distance from the truth [m{unit}]")
         off.set_ylim(bottom=0)
+        above.locator_params(nbins=5)
         above.legend()
     return figure
 
@@ -116,7 +124,8 @@ def errors_figure(number: ArrayLike, errors: Mapping[str, ArrayLike]) -> Figure:
             axes.plot(np.asarray(number), 1000 * np.asarray(error), color=colour, label=name)
         axes.set(xlabel="number of the picture", ylabel="distance from the truth [mm]")
         axes.set_ylim(bottom=0)
-        axes.legend()
+        axes.locator_params(axis="x", nbins=5)
+    axes.legend()
     return figure
 
 
@@ -148,7 +157,7 @@ def bend_figure(
         for colour, (name, ratio) in zip(COLOURS, steps.items(), strict=False):
             left.plot(np.asarray(along), np.asarray(ratio), color=colour, label=name)
         left.set(xlabel="way along the road [m]", ylabel="step in the map / true step")
-        left.legend()
+        left.legend(loc="lower left", fontsize=8)
         _cone(right, np.asarray(product), np.asarray(drift))
     return figure
 
@@ -159,4 +168,5 @@ def _cone(axes: Axes, product: Array, drift: Array) -> None:
     axes.fill_between(line, line, 3 * line, color=style.SKY, alpha=0.3, label="slope 1 to 3")
     axes.plot(product, drift, "o", color=style.VERMILION, ms=5, label="simulated bends")
     axes.set(xlabel="offset of the centre / f, times angle [rad]", ylabel="log of the scale after the bend")
+    axes.locator_params(axis="x", nbins=5)
     axes.legend()
