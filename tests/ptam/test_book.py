@@ -139,13 +139,21 @@ def as_plain(made: VisualMap) -> plain_maps.BookMap:
     return found
 
 
-def test_partners_depths_and_neighbours(desk: Run) -> None:
+def test_partners_and_depths(desk: Run) -> None:
+    """Also where a keyframe stands so near to another that there is no base line between them."""
     made = desk.system.map
     assert made is not None
-    mine = as_plain(made)
+    kept = made.T_kf_world.copy()
     for kf in range(1, len(made.keyframes)):
+        mine = as_plain(made)
         assert mine.depth(kf) == pytest.approx(new_points.median_depth(made, kf), rel=1e-12)
-        assert book.partner(mine, kf) == new_points.partners(made, kf, 1)[0]
+        nearest = book.partner(mine, kf)
+        assert nearest == new_points.partners(made, kf, 1)[0]
+        made.T_kf_world[nearest] = se3.perturb(kept[kf], [0.003, 0, 0, 0, 0, 0])
+        another = book.partner(as_plain(made), kf)
+        assert another == new_points.partners(made, kf, 1)[0]
+        made.T_kf_world[:] = kept
+        assert another != nearest
 
 
 def test_what_ends_with_a_sighting(film: Film) -> None:
