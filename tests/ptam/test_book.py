@@ -12,10 +12,11 @@ from vslam_ref.estimation.bundle import Options, Robust, bundle_adjust, covarian
 from vslam_ref.estimation.bundle.gauge import fix_gauge
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.robust import tuned
+from vslam_ref.features import View, follow
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.alignment import align
 from vslam_ref.systems.ptam import Settings, book, start
-from vslam_ref.systems.ptam.look import prepare
+from vslam_ref.systems.ptam.look import prepare, strong_corners
 from vslam_ref.systems.ptam.mapper import new_points
 from vslam_ref.systems.visual_map import VisualMap
 from vslam_ref.systems.visual_map import book as plain_maps
@@ -122,6 +123,28 @@ def test_a_camera_that_only_turns_does_not_start() -> None:
     pictures = [prepare(k, world.frame(k), book.S.features) for k in range(0, 18, 4)]
     told = book.begin(world.camera, pictures, np.random.default_rng(0))
     assert told == "too few points have parallax"
+
+
+def test_trails_are_found_back(film: Film) -> None:
+    """From picture to picture the loops keep what the fast way keeps, at the same places, and no more.
+
+    The fast way does not compare once more after the refinement, so it may keep a few others.
+    """
+    first, second = (prepare(k, film.pictures[k], book.S.features) for k in (0, 2))
+    corners = book.corners_of(first, 0, strong_corners(first, 0, book.S.features)[:150])
+    went = follow(
+        View(first.levels[0], first.corners[0]),
+        View(second.levels[0], second.corners[0]),
+        np.array(corners, float),
+        book.S.start.search_radius,
+    )
+    places = [book.trail([first, second], c) for c in corners]
+    kept = np.array([u is not None for u in places])
+    assert not (kept & ~went.ok).any()
+    assert 20 < kept.sum() < len(kept)
+    assert (went.ok & ~kept).sum() <= 0.1 * kept.sum()
+    own = np.array([u for u in places if u is not None])
+    assert np.abs(own - went.uv[kept]).max() < 0.02  # both end with steps below a hundredth of a pixel
 
 
 def as_plain(made: VisualMap) -> plain_maps.BookMap:

@@ -91,7 +91,7 @@ def course_figure(
         left.set_ylabel("points")
         right.set(ylabel="share found", ylim=(0, 1.05))
         left.legend()
-        right.legend()
+        right.legend(loc="center right")
     return figure
 
 
@@ -157,7 +157,7 @@ def bend_figure(
         for colour, (name, ratio) in zip(COLOURS, steps.items(), strict=False):
             left.plot(np.asarray(along), np.asarray(ratio), color=colour, label=name)
         left.set(xlabel="way along the road [m]", ylabel="step in the map / true step")
-        left.legend(loc="lower left", fontsize=8)
+        style.legend_below(figure, left, 4)
         _cone(right, np.asarray(product), np.asarray(drift))
     return figure
 

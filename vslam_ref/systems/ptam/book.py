@@ -43,12 +43,14 @@ def corners_of(picture: PreparedPicture, level: int, numbers: IntArray) -> list[
 
 
 def alike_near(picture: PreparedPicture, T: Bytes, u: Array) -> mapper.Corner | None:
-    """Corner of level 0 near u (2,), pixels, that looks most like a patch."""
+    """Corner of level 0 near u (2,), pixels, that looks most like a patch, if it is like it at all."""
     radius = S.start.search_radius
     close = np.flatnonzero((np.abs(picture.corners[0].xy - u) <= radius).all(1))
     corners = corners_of(picture, 0, close)
     k = best_corner(picture.levels[0], corners, T, u, radius)
-    return corners[k] if k >= 0 else None
+    if k < 0 or tracker.unlike(T, mapper.patch_at(picture.levels[0], corners[k])) > S.features.limit:
+        return None
+    return corners[k]
 
 
 def trail(pictures: list[PreparedPicture], corner: mapper.Corner) -> Array | None:
