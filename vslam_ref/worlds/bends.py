@@ -86,7 +86,7 @@ def drive(rng: np.random.Generator, angle: float, radius: float = 12.0, points: 
     place = _places(way, heading)
     T = np.stack([_pose(h, p) for h, p in zip(heading, place, strict=True)])
     X = _beside(rng, place, points)
-    at = CAMERA.pixel_from_world(T[:, None], X[None])
+    at = CAMERA.pixel_from_world(T[:, None], X[None])  # eq-a1-3
     Z = se3.act(T[:, None], X[None])[..., 2]
     seen = at.valid & (at.uv >= 0).all(-1) & (at.uv <= np.array(SIZE) - 1).all(-1) & (Z > NEAR) & (Z < FAR)
     often = seen.sum(0) >= LEAST_VIEWS

@@ -53,7 +53,7 @@ def _match(
     """The fast search there, and the plain one back."""
     distance, near, limit, back = (float(v) for v in gates)
     lens, (first, second) = Pinhole(*params), np.asarray(images).astype(np.uint8)
-    xy_a, xy_b = (np.asarray(xy).astype(np.int64) for xy in (corners_a, corners_b))
+    xy_a, xy_b = (np.asarray(xy).astype(np.int32) for xy in (corners_a, corners_b))
     asked, there = (curve_search.with_bearings(lens, xy, 0) for xy in (xy_a[:1], xy_b))
     rules = curve_search.Gates(0, near, distance, limit)
     found = curve_search.search_curve(cut(first, xy_a[:1]).patch, asked, second, there, T_b_a, rules)
