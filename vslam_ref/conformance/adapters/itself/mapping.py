@@ -20,7 +20,8 @@ Array = NDArray[Any]
 
 
 def _ray_depths(a: Array, b: Array, T_b_a: Array) -> Array:
-    return curve_search.ray_depths(a[None], b[None], T_b_a)[0]
+    found: Array = curve_search.ray_depths(a[None], b[None], T_b_a)[0]
+    return found
 
 
 def _triangulated(params: Array, uv_a: Array, uv_b: Array, T_b_a: Array, sigma_px: float) -> dict[str, Any]:
