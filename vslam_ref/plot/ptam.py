@@ -91,7 +91,7 @@ def course_figure(
         left.set_ylabel("points")
         right.set(ylabel="share found", ylim=(0, 1.05))
         left.legend()
-        right.legend(loc="center right")
+        right.legend(loc="lower left", bbox_to_anchor=(0.0, 0.32))
     return figure
 
 
