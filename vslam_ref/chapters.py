@@ -63,7 +63,7 @@ CHAPTERS = (
     Chapter(9, "Two views", "From images to a map", "geometry/multiview/two_views", "09_two_views"),
     Chapter(10, "Tracking", "From images to a map", "systems/ptam/tracker", "10_tracking"),
     Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper", "11_mapping"),
-    Chapter(12, "PTAM", "From images to a map", "systems/ptam"),
+    Chapter(12, "PTAM", "From images to a map", "systems/ptam", "12_ptam"),
     Chapter(13, "Pose graphs", "Closing loops", "estimation/posegraph"),
     Chapter(14, "ORB-SLAM", "Closing loops", "systems/orbslam"),
     Chapter(15, "Ackermann EKF-SLAM", "Filters", "filters/ekf_slam", "15_ekf_slam"),

@@ -11,6 +11,7 @@ from typing import Any
 import plain_cameras
 import plain_estimates
 import plain_features
+import plain_mapping
 import plain_motions
 import plain_tracking
 import plain_two_views
@@ -30,11 +31,14 @@ PROGRAM: dict[str, Callable[..., Any]] = {
     **plain_estimates.PROGRAM,
     **plain_views.PROGRAM,
     **plain_features.PROGRAM,
+    **plain_mapping.PROGRAM,
     **plain_tracking.PROGRAM,
     **plain_two_views.PROGRAM,
 }
 FILES = [
-    name for name in form.names() if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "23")
+    name
+    for name in form.names()
+    if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "11", "23")
 ]
 MISTAKES = mistakes(FILES)
 
@@ -57,6 +61,7 @@ def test_all_topics_are_there() -> None:
     assert topics >= {
         *("multiview", "so2", "se2", "so3", "quaternion", "se3", "sim3", "camera", "loss", "scale", "noise"),
         *("least_squares", "bundle", "trajectory", "format", "features", "two_views", "tracking"),
+        "mapping",
     }
 
 

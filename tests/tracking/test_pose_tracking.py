@@ -10,7 +10,7 @@ from scipy import integrate, optimize, stats
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.pose_tracking import TrackedPose, track_pose
-from vslam_ref.estimation.robust import L2, efficiency, tuned
+from vslam_ref.estimation.robust import L2, covariance_factor, efficiency, tuned
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole
 
@@ -83,7 +83,8 @@ def test_at_the_end_it_is_the_weighted_least_squares_of_scipy(camera: Camera, na
         np.zeros(6), jac="3-point", xtol=1e-14, ftol=1e-14, gtol=1e-12, x_scale=1e-3,
     )  # fmt: skip
     assert np.abs(there.x).max() < 1e-7
-    expected = found.sigma**2 * np.linalg.inv(there.jac.T @ there.jac)
+    weigh = covariance_factor(loss, 2)
+    expected = weigh * found.sigma**2 * np.linalg.inv(there.jac.T @ there.jac)
     np.testing.assert_allclose(found.cov_pose, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
 
 
@@ -171,18 +172,23 @@ def test_the_covariance_of_squares_is_the_spread_of_the_poses() -> None:
     assert abs(scales.mean() - 0.99) < error + 0.005
 
 
-def test_the_covariance_of_tukeys_pose_is_a_little_large_by_a_known_factor() -> None:
+@pytest.mark.parametrize("name", ["tukey", "huber"])
+def test_the_covariance_of_a_robust_pose_is_the_spread_of_the_poses(name: str) -> None:
     """H counts a measurement by its weight, E w; it is worth B^2 / A, the efficiency of chapter 4.
 
-    So the squared errors are short by E w / efficiency = 0.90; a chi-square band for 300 runs, both sides.
+    A chi-square band for 300 runs, both sides; and beside squares of the same noise, whose covariance is
+    known to be right: what both have in common cancels, and a tenth shows.
     """
-    loss = tuned("tukey", 2)
-    mean_weight = integrate.quad(lambda r: loss.weight(r) * r * np.exp(-r * r / 2), 0, loss.c)[0]
-    factor = mean_weight / efficiency(loss, 2)
-    assert 0.88 < factor < 0.93
-    values, _ = nees(loss, 300)
+    loss = tuned(name, 2)
+    mean_weight = integrate.quad(lambda r: loss.weight(r) * r * np.exp(-r * r / 2), 0, 12, points=[loss.c])[0]
+    factor = covariance_factor(loss, 2)
+    assert factor == pytest.approx(mean_weight / efficiency(loss, 2), rel=1e-9)
+    values, squares = nees(loss, 300)[0], nees(L2(), 300)[0]
     low, high = stats.chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], 6 * len(values))
-    assert low < values.sum() / factor < high
+    assert low < values.sum() < high
+    apart = stats.norm.ppf(1 - FALSE_ALARM / 2) * np.std(values - squares) / np.sqrt(len(values))
+    assert abs(values.mean() - squares.mean()) < apart
+    assert abs(factor * values.mean() - squares.mean()) > apart  # the covariance of weights alone
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])

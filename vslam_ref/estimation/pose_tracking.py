@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, as_array
-from vslam_ref.estimation.robust import L2, Loss, Tukey, norm_scale, tuned
+from vslam_ref.estimation.robust import L2, Loss, Tukey, covariance_factor, norm_scale, tuned
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Pinhole
 from vslam_ref.geometry.cameras.projection import pose_jacobian
@@ -43,8 +43,7 @@ class TrackedPose(NamedTuple):
     sigma : float
         Scale of the errors in one coordinate, in units of ``sigma_px``.
     cov_pose : ndarray, shape (6, 6)
-        Of the left perturbation (rho, phi), to first order.  With Tukey's loss a tenth too large: a
-        measurement counts by its weight, 0.86 in the mean, and is worth its efficiency, 0.95.
+        Of the left perturbation (rho, phi), to first order, for Gaussian errors with ``sigma``.
     reason : str
         Empty, or why there is no pose.
     """
@@ -126,13 +125,14 @@ def track_pose(
         found = _Steps(T, w, float(last[0]), H, int(last[1]))
     else:
         found = _steps(camera, T, X, u, root, rho, steps, least_sigma)
-    return _result(found)
+    return _result(found, rho)
 
 
-def _result(found: _Steps) -> TrackedPose:
+def _result(found: _Steps, rho: Loss) -> TrackedPose:
     cov: Array = np.diag(np.full(6, np.inf))
     if found.trouble == FINE:
-        cov = np.asarray(found.sigma**2 * np.linalg.inv(found.H))
+        factor = covariance_factor(rho, 2) * found.sigma**2
+        cov = np.asarray(factor * np.linalg.inv(found.H))  # eq-weight-covariance
     agree = f"{np.count_nonzero(found.weights)} measurements agree: a pose needs at least {LEAST_POINTS}"
     reason = {FINE: "", FEW: agree, UNDETERMINED: "the points do not determine the pose"}[found.trouble]
     return TrackedPose(found.T_cam_world, found.weights, found.sigma, cov, reason)

@@ -14,6 +14,7 @@ from types import ModuleType
 HELPERS = (
     "exact",
     "building",
+    "curve_matches",
     "draws",
     "writing",
     "exact_arrays",

@@ -24,7 +24,7 @@ module              holds
 """
 
 from vslam_ref.estimation.robust.as_printed import TukeyAsPrinted
-from vslam_ref.estimation.robust.efficiency import TUNED_95, efficiency, tuned
+from vslam_ref.estimation.robust.efficiency import TUNED_95, covariance_factor, efficiency, tuned
 from vslam_ref.estimation.robust.losses import L2, LOSSES, Cauchy, GemanMcClure, Huber, Loss, Tukey
 from vslam_ref.estimation.robust.scale import (
     MAD_1D,
@@ -48,6 +48,7 @@ __all__ = [
     "Scale",
     "Tukey",
     "TukeyAsPrinted",
+    "covariance_factor",
     "efficiency",
     "mad_scale",
     "norm_scale",

@@ -12,11 +12,13 @@ one coordinate of the estimate has the variance :math:`A/(N B^2)` for large N; t
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
+from vslam_ref.arrays import Array
 from vslam_ref.estimation.robust.losses import LOSSES, Loss
 
 TUNED_95: Final[dict[tuple[str, int], float]] = {
@@ -98,6 +100,51 @@ def efficiency(loss: Loss, dimension: int = 1) -> float:
     >>> round(efficiency(Tukey(4.6851)), 4), round(efficiency(Tukey(4.6851), 2), 4)
     (0.95, 0.929)
     """
+    r, dm = _norms(loss, dimension)
+    top = float(np.sum(dm * ((1 - 1 / dimension) * loss.weight(r) + loss.curvature(r) / dimension)))
+    return top**2 / (float(np.sum(dm * loss.influence(r) ** 2)) / dimension)
+
+
+@lru_cache(maxsize=64)
+def covariance_factor(loss: Loss, dimension: int = 1) -> float:
+    r"""Return the factor that makes a covariance of the last weights right: E w over the efficiency.
+
+    Implements :eq:`eq-weight-covariance`.
+
+    Parameters
+    ----------
+    loss : Loss
+        With its constant in units of sigma.
+    dimension : int
+        Number d of coordinates of an error, 1 to 10; the loss is applied to its norm.
+
+    Returns
+    -------
+    float
+        1 for least squares.
+
+    Raises
+    ------
+    ValueError
+        If the dimension is out of range.
+
+    Notes
+    -----
+    The matrix H of the weighted normal equations counts a measurement by its weight, whose mean is E w; it is
+    worth its efficiency.  For Gaussian errors, and weights that do not depend on where a measurement lies.
+
+    Examples
+    --------
+    >>> from vslam_ref.estimation.robust import L2, tuned
+    >>> round(covariance_factor(tuned("tukey", 2), 2), 4), round(covariance_factor(L2(), 2), 12)
+    (0.9046, 1.0)
+    """
+    r, dm = _norms(loss, dimension)
+    return float(np.sum(dm * loss.weight(r))) / efficiency(loss, dimension)
+
+
+def _norms(loss: Loss, dimension: int) -> tuple[Array, Array]:
+    """Norms of standard Gaussian errors at the nodes of a quadrature, and their probabilities."""
     if not 1 <= dimension <= 10:
         raise ValueError(f"dimension={dimension}: must be from 1 to 10")
     d = dimension
@@ -107,5 +154,4 @@ def efficiency(loss: Loss, dimension: int = 1) -> float:
     r = np.concatenate([a + (b - a) * (x + 1) / 2 for a, b in pairwise(edges)])
     dr = np.concatenate([(b - a) * w / 2 for a, b in pairwise(edges)])
     density = r ** (d - 1) * np.exp(-r * r / 2) / (2 ** (d / 2 - 1) * math.gamma(d / 2))
-    top = float(np.sum(dr * density * ((1 - 1 / d) * loss.weight(r) + loss.curvature(r) / d)))
-    return top**2 / (float(np.sum(dr * density * loss.influence(r) ** 2)) / d)
+    return r, dr * density

@@ -143,7 +143,8 @@ def find(seen: SeenPoint, picture: PreparedPicture, radius: float) -> Array | No
     T, u, reach = template(seen), on_level(seen.u, seen.level), max(radius / 2**seen.level, 1.5)
     place = refined(image, T, u)
     if place is None or np.hypot(*(place - u)) > reach:
-        whole = [(int(x), int(y)) for x, y in corners if inside(image, np.array([x, y]), 4, 3)]
+        close = corners[(np.abs(corners - u) <= reach).all(1)]
+        whole = [(int(x), int(y)) for x, y in close if inside(image, np.array([x, y]), 4, 3)]
         k = best_corner(image, whole, T, u, reach)
         place = from_corner(image, T, whole[k]) if k >= 0 else None
     return None if place is None else 2**seen.level * place + (2**seen.level - 1) / 2  # eq-level-position
@@ -191,6 +192,30 @@ def quality(weights: list[float], levels: list[int]) -> str:
     return "good" if share > 0.3 else "poor"
 
 
+class TwoPasses(NamedTuple):
+    """Pose T (4, 4), metres and radians, and the points tried: places (pixels, or None) and weights."""
+
+    T: Array
+    tried: list[SeenPoint]
+    places: list[Array | None]
+    weights: list[float]
+
+
+def two_passes(
+    camera: Camera, points: list[Point], picture: PreparedPicture, T: Array, rng: np.random.Generator
+) -> TwoPasses:
+    """Few points around a guess T (4, 4) of the pose, metres and radians; then all, around a better one."""
+    for most, radius, coarse in ((60, 10.0, True), (1000, 5.0, False)):
+        seen = choose(visible(camera, points, T, picture), most, coarse, rng)
+        places = [find(s, picture, radius) for s in seen]
+        pairs = list(zip(seen, places, strict=True))
+        found = [Match(s.point.X, u, 2.0**s.level) for s, u in pairs if u is not None]
+        for _ in range(10):
+            T, _ = tukey_step(camera, found, T)
+    weight = iter(tukey_step(camera, found, T)[1])
+    return TwoPasses(T, seen, places, [next(weight) if u is not None else 0.0 for u in places])
+
+
 def track(
     camera: Camera,
     points: list[Point],
@@ -200,13 +225,5 @@ def track(
     rng: np.random.Generator,
 ) -> tuple[Array, str]:
     """Pose of the next picture and its worth, from T_last (4, 4) and v (6,), metres and radians."""
-    T = se3.exp(v) @ T_last  # eq-a2-5
-    for most, radius, coarse in ((60, 10.0, True), (1000, 5.0, False)):
-        seen = choose(visible(camera, points, T, picture), most, coarse, rng)
-        places = [find(s, picture, radius) for s in seen]
-        pairs = list(zip(seen, places, strict=True))
-        found = [Match(s.point.X, u, 2.0**s.level) for s, u in pairs if u is not None]
-        for _ in range(10):
-            T, _ = tukey_step(camera, found, T)
-    weight = iter(tukey_step(camera, found, T)[1])
-    return T, quality([next(weight) if u is not None else 0.0 for u in places], [s.level for s in seen])
+    done = two_passes(camera, points, picture, se3.exp(v) @ T_last, rng)  # eq-a2-5
+    return done.T, quality(done.weights, [s.level for s in done.tried])
