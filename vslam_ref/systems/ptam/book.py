@@ -163,10 +163,12 @@ def new_points(made: BookMap, kf: int) -> set[int]:
             mapper.Side(level, p.levels[level], [(int(x), int(y)) for x, y in look.peaks(p, level, f)])
             for p in (made.pictures[kf], made.pictures[other])
         )
-        taken = [tracker.on_level(at.u, level) for (k, _), at in made.sightings.items() if k == kf]
+        taken = [
+            (tracker.on_level(at.u, level), at.level) for (k, _), at in made.sightings.items() if k == kf
+        ]
         strong = look.strong_corners(made.pictures[kf], level, f)[:TRIED]
         for corner in corners_of(made.pictures[kf], level, strong):
-            if mapper.is_free(corner, taken, S.mapper.spacing):
+            if mapper.is_free(corner, level, taken, S.mapper.spacing):
                 places = matched(made.camera, corner, a, b, T_other_kf, gates)
                 X = triangulated(made, kf, other, level, places) if places else None
                 if X is not None and places is not None:
