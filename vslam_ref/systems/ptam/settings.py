@@ -38,7 +38,12 @@ class StartSettings:
 
     trails: int = assume(800, "points", "PTAM starts with 1000 corners")
     least_trails: int = assume(80, "points", "fewer: the trails begin anew")
-    search_radius: float = assume(12.0, "px", "from picture to picture, around where it was going")
+    search_radius: float = assume(
+        12.0, "px", "from picture to picture, around where it was going; twice as far while that is unknown"
+    )
+    found_again: float = assume(
+        0.5, "share", "fewer found: the picture turned, and the small images may know how"
+    )
     least_motion: float = assume(8.0, "px", "median length of the trails before a start is tried")
     least_pictures: int = assume(
         6, "pictures", "a rolling shutter makes parallax out of a quick turn; the true one grows with time"
