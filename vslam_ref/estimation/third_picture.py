@@ -167,8 +167,8 @@ def ask_third(
     refined = np.stack([views.T_b_a for views in each])
     pairs = two_views.cheirality(np.stack([T, refined]), a, b, sigma).squared
     triples = np.stack([views.squared for views in each])
-    # a triple that fits none of the answers is a wrong match: it would only make all costs alike
-    known = (triples <= THREE_EQUATIONS).any(axis=0)
+    # a pair that fits none of the answers is a wrong match; one that fits must fit the third picture, too
+    known = (pairs <= ONE_EQUATION).any(axis=(0, 1))
     known = known if known.any() else np.ones(len(a), np.bool_)
     pair_costs = truncated_cost(pairs[..., known], ONE_EQUATION).min(axis=0)
     costs = truncated_cost(triples[:, known], THREE_EQUATIONS)

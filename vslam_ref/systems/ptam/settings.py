@@ -52,9 +52,6 @@ class StartSettings:
     wide_parallax: float = assume(1.0, "degrees", "of the points that make the map")
     wide_points: int = assume(45, "points", "with that parallax at least")
     cost: float = assume(0.25, "px^2 per point", "Sampson distance squared, of inliers and outliers alike")
-    depth_spread: float = assume(
-        1.25, "ratio of the 90 % to the 10 % depth", "one depth is a plane: nothing is known"
-    )
     keep: float = assume(
         0.6, "share", "of the trails that must survive following from the first picture again"
     )

@@ -63,7 +63,8 @@ class Attempt(NamedTuple):
     row : ndarray of int64, shape (n,)
         Numbers of these trails.
     agrees : ndarray of bool, shape (n,)
-        Whether their distance from the motion's epipolar lines is small.
+        Whether they fit a motion that the third picture agrees with; all, while there is none: a wrong
+        motion would keep just those trails that are wrong with it.
     between : int
         Number of the picture that was asked which answer is right; -1 where none was.
     """
@@ -133,13 +134,13 @@ def _judged(
     """Triangulate, and say what is missing for a start."""
     choice, reason = found.choice, found.reason if third is None else third.reason
     cost, rivals = (choice.cost, choice.rivals) if choice is not None else (np.inf, ())
-    T_b_a, agrees = found.T_b_a, found.inliers
+    T_b_a, fitting, trusted = found.T_b_a, found.inliers, False
     if third is not None and third.views is not None:
-        T_b_a, agrees = third.views.T_b_a, _fits(camera, third.views.T_b_a, pair)
-        cost = third.pair_costs[third.best]
+        T_b_a, fitting = third.views.T_b_a, _fits(camera, third.views.T_b_a, pair)
+        cost, trusted = third.pair_costs[third.best], not third.reason
     views = Views(camera, np.stack([se3.identity(), T_b_a]))
     points = triangulate(views, np.stack([pair.uv_a, pair.uv_b], 1), min_parallax=0.0, max_iterations=10)
-    fits = agrees & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
+    fits = fitting & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
     angle = np.degrees(points.parallax)
     good = fits & points.ok & (angle >= 0.5 * s.parallax)
     parallax = float(np.median(angle[fits])) if fits.any() else 0.0
@@ -154,9 +155,9 @@ def _judged(
         cost=float(cost),
         rivals=rivals,
         parallax=parallax,
-        reason=reason or _missing(parallax, wide, float(cost), points.X_world[good, 2], s),
+        reason=reason or _missing(parallax, wide, float(cost), s),
         row=pair.row,
-        agrees=agrees,
+        agrees=fitting | (not trusted),
         between=between,
     )
 
@@ -168,7 +169,7 @@ def _fits(camera: Camera, T_b_a: Array, pair: Pair) -> BoolArray:
     return np.asarray(two_views.cheirality(T_b_a, a, b, sigma).squared <= ONE_EQUATION)
 
 
-def _missing(parallax: float, wide: int, cost: float, depth: Array, s: StartSettings) -> str:
+def _missing(parallax: float, wide: int, cost: float, s: StartSettings) -> str:
     """Why a motion is no start, or nothing."""
     if parallax < s.parallax:
         return f"the rays of a point differ by {parallax:.2f} degrees: need {s.parallax:g}"
@@ -176,9 +177,6 @@ def _missing(parallax: float, wide: int, cost: float, depth: Array, s: StartSett
         return f"{wide} points have {s.wide_parallax:g} degrees of parallax: need {s.wide_points}"
     if cost > s.cost:
         return f"the cost is {cost:.2f} px^2 a point: at most {s.cost:g}"
-    spread = float(np.percentile(depth, 90) / np.percentile(depth, 10)) if len(depth) > 10 else 1.0
-    if spread < s.depth_spread:
-        return f"depths differ by a factor of {spread:.2f}: need {s.depth_spread:g}"
     return ""
 
 
