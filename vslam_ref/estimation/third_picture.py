@@ -98,10 +98,12 @@ class ThirdPicture:
         Its number among the answers; -1 where there is none.
     views : ThreeViews or None
         Refined in all three pictures.
-    pair_costs : ndarray, shape (K,)
-        Of the answers, as they came or refined, what is less: two pictures, one equation.
     costs : ndarray, shape (K,)
-        Of the answers, refined: three pictures, three equations.
+        Of the answers, refined, per triple that fits one of them: three equations, units of sigma^2.
+    pair_cost : float
+        Of the best, as it came or refined, in the two pictures alone, per pair that fits: one equation.
+    added : float
+        What each of the two equations of the third picture costs the same pairs.
     inliers : ndarray of bool, shape (N,)
         Triples that fit the best.
     reason : str
@@ -110,8 +112,9 @@ class ThirdPicture:
 
     best: int
     views: ThreeViews | None
-    pair_costs: Array
     costs: Array
+    pair_cost: float
+    added: float
     inliers: BoolArray
     reason: str
 
@@ -161,30 +164,43 @@ def ask_third(
         raise ValueError(f"answers of shape {T.shape}: need finite (K, 4, 4)")
     if len(T) == 0 or len(a) < LEAST:
         why = f"{len(a)} points are seen in all three pictures, {len(T)} answers: need {LEAST}, and 1"
-        return ThirdPicture(-1, None, np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(a), np.bool_), why)
+        nothing = np.zeros(len(a), np.bool_)
+        return ThirdPicture(-1, None, np.zeros(len(T)), np.inf, np.inf, nothing, why)
     each = [refine_three(t, a, m, b, sigma=sigma, share=share) for t in T]
     # an answer may have moved to its valley's floor only now
     refined = np.stack([views.T_b_a for views in each])
     pairs = two_views.cheirality(np.stack([T, refined]), a, b, sigma).squared
     triples = np.stack([views.squared for views in each])
-    # a pair that fits none of the answers is a wrong match; one that fits must fit the third picture, too
-    known = (pairs <= ONE_EQUATION).any(axis=(0, 1))
-    known = known if known.any() else np.ones(len(a), np.bool_)
-    pair_costs = truncated_cost(pairs[..., known], ONE_EQUATION).min(axis=0)
-    costs = truncated_cost(triples[:, known], THREE_EQUATIONS)
+    fits = triples <= THREE_EQUATIONS
+    # a triple that fits none of the answers is a wrong match: it would only make all costs alike
+    costs = truncated_cost(triples[:, _some(fits.any(axis=0))], THREE_EQUATIONS)
     best = int(np.argmin(costs))
-    reason = _reason(each, pair_costs, costs, best)
-    return ThirdPicture(best, each[best], pair_costs, costs, triples[best] <= THREE_EQUATIONS, reason)
+    # but a pair that fits the best must fit the third picture, too
+    pair = pairs[:, best].min(axis=0)
+    known = _some(pair <= ONE_EQUATION)
+    pair_cost = float(truncated_cost(pair[known], ONE_EQUATION))
+    added = (float(truncated_cost(triples[best, known], THREE_EQUATIONS)) - pair_cost) / 2.0
+    reason = _disagreement(pair_cost, added) or _rival(each, costs, best)
+    return ThirdPicture(best, each[best], costs, pair_cost, added, fits[best], reason)
 
 
-def _reason(each: list[ThreeViews], pair_costs: Array, costs: Array, best: int) -> str:
-    """Empty, or what the third picture has against the best answer."""
-    cost, pair = float(costs[best]), float(pair_costs[best])
-    added = (cost - pair) / 2.0
-    if added > RATIO * pair + MARGIN:
+def _some(chosen: BoolArray) -> BoolArray:
+    """What was chosen, or everything if nothing was."""
+    return chosen if chosen.any() else np.ones(len(chosen), np.bool_)
+
+
+def _disagreement(pair_cost: float, added: float) -> str:
+    if added > RATIO * pair_cost + MARGIN:
         return (
-            f"a picture between does not agree: it adds {added:.3g} an equation to the {pair:.3g} of the pair"
+            f"a picture between does not agree: it adds {added:.3g} an equation to the {pair_cost:.3g} "
+            "of the pair"
         )
+    return ""
+
+
+def _rival(each: list[ThreeViews], costs: Array, best: int) -> str:
+    """Empty, or which other motion stands in the way."""
+    cost = float(costs[best])
     for k in np.argsort(costs, kind="stable"):
         other = two_views.apart(each[k].T_b_a, each[best].T_b_a) >= SAME_VALLEY
         if other and costs[k] < RATIO * cost + MARGIN:

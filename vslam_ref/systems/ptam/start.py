@@ -24,7 +24,7 @@ from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views, two_views
 from vslam_ref.geometry.multiview.two_views import Choice
-from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION
+from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION, truncated_cost
 from vslam_ref.systems.ptam.mapper.mapper import adjust_all
 from vslam_ref.systems.ptam.mapper.new_points import new_points
 from vslam_ref.systems.ptam.settings import Settings, StartSettings
@@ -134,10 +134,11 @@ def _judged(
     """Triangulate, and say what is missing for a start."""
     choice, reason = found.choice, found.reason if third is None else third.reason
     cost, rivals = (choice.cost, choice.rivals) if choice is not None else (np.inf, ())
-    T_b_a, fitting, trusted = found.T_b_a, found.inliers, False
+    T_b_a, fitting = found.T_b_a, found.inliers
     if third is not None and third.views is not None:
-        T_b_a, fitting = third.views.T_b_a, _fits(camera, third.views.T_b_a, pair)
-        cost, trusted = third.pair_costs[third.best], not third.reason
+        T_b_a = third.views.T_b_a
+        squared = _squared(camera, T_b_a, pair)
+        cost, fitting = truncated_cost(squared, ONE_EQUATION), squared <= ONE_EQUATION
     views = Views(camera, np.stack([se3.identity(), T_b_a]))
     points = triangulate(views, np.stack([pair.uv_a, pair.uv_b], 1), min_parallax=0.0, max_iterations=10)
     fits = fitting & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
@@ -157,16 +158,15 @@ def _judged(
         parallax=parallax,
         reason=reason or _missing(parallax, wide, float(cost), s),
         row=pair.row,
-        agrees=fitting | (not trusted),
+        agrees=np.ones(len(fitting), np.bool_),
         between=between,
     )
 
 
-def _fits(camera: Camera, T_b_a: Array, pair: Pair) -> BoolArray:
-    """Which pairs fit a motion, as :func:`estimate_motion` counts them."""
+def _squared(camera: Camera, T_b_a: Array, pair: Pair) -> Array:
+    """Squared distances (n,) of the pairs from a motion, pixels."""
     a, b = camera.unproject(pair.uv_a).xn, camera.unproject(pair.uv_b).xn
-    sigma = 1.0 / float(np.sqrt(camera.fx * camera.fy))
-    return np.asarray(two_views.cheirality(T_b_a, a, b, sigma).squared <= ONE_EQUATION)
+    return two_views.cheirality(T_b_a, a, b, 1.0 / float(np.sqrt(camera.fx * camera.fy))).squared
 
 
 def _missing(parallax: float, wide: int, cost: float, s: StartSettings) -> str:
