@@ -53,7 +53,7 @@ class Attempt(NamedTuple):
     X_a : ndarray, shape (n, 3)
         Points in the first camera's frame; the base line is 1.
     cost : float
-        Pixels squared per point.
+        Pixels squared per pair, outliers too, but not pairs that fit no answer.
     rivals : tuple of (str, float)
         Other answers of the two pictures and their costs.
     parallax : float
@@ -62,9 +62,6 @@ class Attempt(NamedTuple):
         Empty if this is a start.
     row : ndarray of int64, shape (n,)
         Numbers of these trails.
-    agrees : ndarray of bool, shape (n,)
-        Whether they fit a motion that the third picture agrees with; all, while there is none: a wrong
-        motion would keep just those trails that are wrong with it.
     between : int
         Number of the picture that was asked which answer is right; -1 where none was.
     """
@@ -80,7 +77,6 @@ class Attempt(NamedTuple):
     parallax: float
     reason: str
     row: IntArray
-    agrees: BoolArray
     between: int
 
 
@@ -93,9 +89,9 @@ def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Gen
     uv_a, uv_b, level = trails.first[ok], again[ok], trails.level[ok]
     pair = Pair(uv_a, uv_b, level, np.flatnonzero(ok))
     a, b = camera.unproject(uv_a).xn, camera.unproject(uv_b).xn
-    sigma = 1.0 / float(np.sqrt(camera.fx * camera.fy))
+    sigma = _sigma(camera)
     found = estimate_motion(a, b, rng, sigma=sigma)
-    if found.choice is None or found.reason not in ("", found.choice.reason):
+    if found.choice is None or found.reason not in ("", found.choice.reason):  # no rival's fault
         return _judged(camera, pair, s, found, None, -1)
     number = _between(trails)
     third = _asked(camera, trails, pair, found.choice, number, sigma)
@@ -129,19 +125,22 @@ class Pair(NamedTuple):
 
 
 def _judged(
-    camera: Camera, pair: Pair, s: StartSettings, found: MotionEstimate, third: ThirdPicture | None, between: int
+    camera: Camera,
+    pair: Pair,
+    s: StartSettings,
+    found: MotionEstimate,
+    third: ThirdPicture | None,
+    between: int,
 ) -> Attempt:
     """Triangulate, and say what is missing for a start."""
     choice, reason = found.choice, found.reason if third is None else third.reason
-    cost, rivals = (choice.cost, choice.rivals) if choice is not None else (np.inf, ())
-    T_b_a, fitting = found.T_b_a, found.inliers
-    if third is not None and third.views is not None:
+    T_b_a, fit = found.T_b_a, _Fit(np.inf, found.inliers)
+    if third is not None and third.views is not None and choice is not None:
         T_b_a = third.views.T_b_a
-        squared = _squared(camera, T_b_a, pair)
-        cost, fitting = truncated_cost(squared, ONE_EQUATION), squared <= ONE_EQUATION
+        fit = _fit(camera, T_b_a, choice, pair)
     views = Views(camera, np.stack([se3.identity(), T_b_a]))
     points = triangulate(views, np.stack([pair.uv_a, pair.uv_b], 1), min_parallax=0.0, max_iterations=10)
-    fits = fitting & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
+    fits = fit.fits & (points.rmse_px <= WORST_PIXELS * level_sigma(pair.level))
     angle = np.degrees(points.parallax)
     good = fits & points.ok & (angle >= 0.5 * s.parallax)
     parallax = float(np.median(angle[fits])) if fits.any() else 0.0
@@ -153,20 +152,35 @@ def _judged(
         level=pair.level,
         good=good,
         X_a=points.X_world,
-        cost=float(cost),
-        rivals=rivals,
+        cost=fit.cost,
+        rivals=choice.rivals if choice is not None else (),
         parallax=parallax,
-        reason=reason or _missing(parallax, wide, float(cost), s),
+        reason=reason or _missing(parallax, wide, fit.cost, s),
         row=pair.row,
-        agrees=np.ones(len(fitting), np.bool_),
         between=between,
     )
 
 
-def _squared(camera: Camera, T_b_a: Array, pair: Pair) -> Array:
-    """Squared distances (n,) of the pairs from a motion, pixels."""
+def _fit(camera: Camera, T_b_a: Array, choice: Choice, pair: Pair) -> _Fit:
+    """Tell how well a motion explains the pairs."""
     a, b = camera.unproject(pair.uv_a).xn, camera.unproject(pair.uv_b).xn
-    return two_views.cheirality(T_b_a, a, b, 1.0 / float(np.sqrt(camera.fx * camera.fy))).squared
+    motions = np.concatenate([T_b_a[None], choice.answers])
+    squared = two_views.cheirality(motions, a, b, _sigma(camera)).squared
+    fits = squared <= ONE_EQUATION
+    cost = truncated_cost(squared[0, fits.any(axis=0)], ONE_EQUATION) if fits.any() else ONE_EQUATION
+    return _Fit(float(cost), fits[0])
+
+
+class _Fit(NamedTuple):
+    """Cost per pair that fits any answer, pixels squared, and which pairs fit this one (n,)."""
+
+    cost: float
+    fits: BoolArray
+
+
+def _sigma(camera: Camera) -> float:
+    """One pixel, in normalised positions."""
+    return 1.0 / float(np.sqrt(camera.fx * camera.fy))
 
 
 def _missing(parallax: float, wide: int, cost: float, s: StartSettings) -> str:

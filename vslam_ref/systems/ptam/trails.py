@@ -34,6 +34,8 @@ from vslam_ref.systems.visual_map import PreparedPicture
 
 LEVELS = (0, 1)
 """Of the pyramid, on which trails run: a bare scene has too few corners on one."""
+FIRST = "the first picture"
+"""Why nothing is tried with it."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,33 @@ def _as_the_whole(trails: Trails, picture: PreparedPicture) -> Array:
     last = trails.pictures[-1]
     motion = plane_motion(last.small, picture.small)
     return trails.now if motion.reason else moved_by(motion, last.small, trails.now)
+
+
+def worn(trails: Trails | None, s: StartSettings) -> str:
+    """Why trails begin anew with this picture, or nothing."""
+    if trails is None:
+        return FIRST
+    if len(trails.level) < s.least_trails:
+        return f"{len(trails.level)} corners were found again: need {s.least_trails}, begun anew"
+    if len(trails.pictures) > s.patience:
+        return f"{s.patience} pictures without a start: begun anew"
+    return ""
+
+
+def too_few(trails: Trails, s: StartSettings) -> str:
+    """Why trails that just began lead nowhere, or nothing."""
+    count = len(trails.level)
+    return f"{count} corners in a picture: need {s.least_trails}" if count < s.least_trails else ""
+
+
+def too_early(trails: Trails, s: StartSettings) -> str:
+    """Why no start is tried yet, or nothing."""
+    if trails.length < s.least_motion:
+        return f"the corners have moved {trails.length:.2f} px: need {s.least_motion:g}"
+    count = len(trails.pictures) - 1
+    if count < s.least_pictures:
+        return f"the corners were followed over {count} pictures: need {s.least_pictures}"
+    return ""
 
 
 def from_the_first(trails: Trails) -> Array:
