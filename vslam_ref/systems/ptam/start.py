@@ -1,4 +1,4 @@
-"""From trails to a first map, or the reason why not yet.
+r"""From trails to a first map, or the reason why not yet.
 
 ::
 
@@ -23,7 +23,7 @@ from vslam_ref.features import level_sigma
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views, two_views
-from vslam_ref.geometry.multiview.two_views import Choice
+from vslam_ref.geometry.multiview.two_views import Choice, Draws
 from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION, truncated_cost
 from vslam_ref.systems.ptam.mapper.mapper import adjust_all
 from vslam_ref.systems.ptam.mapper.new_points import new_points
@@ -35,6 +35,11 @@ WORST_PIXELS = 3.0
 """Pixels of the level: root mean square distance of a point of the first map from its two sightings."""
 
 
+DRAWS = Draws(least=50)
+"""Samples: as many as the confidence of 0.999 asks for, 50 at least.
+
+More would look for a sample that noise has harmed less, and all answers are refined anyway.
+"""
 ANSWERS = 3
 """Of the two pictures, the cheapest: both of a plane, and that of the essential matrix."""
 
@@ -90,7 +95,7 @@ def attempt(camera: Camera, trails: Trails, s: StartSettings, rng: np.random.Gen
     pair = Pair(uv_a, uv_b, level, np.flatnonzero(ok))
     a, b = camera.unproject(uv_a).xn, camera.unproject(uv_b).xn
     sigma = _sigma(camera)
-    found = estimate_motion(a, b, rng, sigma=sigma)
+    found = estimate_motion(a, b, rng, sigma=sigma, draws=DRAWS)
     if found.choice is None or found.reason not in ("", found.choice.reason):  # no rival's fault
         return _judged(camera, pair, s, found, None, -1)
     number = _between(trails)

@@ -32,7 +32,7 @@ from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked
 from vslam_ref.geometry.multiview.two_views.eight_point import linear_essential
 from vslam_ref.geometry.multiview.two_views.five_point import five_point_essentials
 from vslam_ref.geometry.multiview.two_views.homography import fit_homography
-from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_squared
 
 ONE_EQUATION, TWO_EQUATIONS = 3.841458820694124, 5.991464547107979
 """What chi-square of one and of two degrees of freedom stays below with probability 0.95."""
@@ -261,4 +261,4 @@ def _squared_E(E: Array, a: Array, b: Array) -> Array:
 
 
 def _squared_H(H: Array, a: Array, b: Array) -> Array:
-    return np.asarray(np.sum(homography_sampson(H, a, b) ** 2, axis=-1))
+    return homography_squared(H, a, b)
