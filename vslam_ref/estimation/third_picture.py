@@ -173,7 +173,7 @@ def ask_third(
     triples = np.stack([views.squared for views in each])
     fits = triples <= THREE_EQUATIONS
     # a triple that fits none of the answers is a wrong match: it would only make all costs alike
-    costs = truncated_cost(triples[:, _some(fits.any(axis=0))], THREE_EQUATIONS)
+    costs = truncated_cost(triples[:, _some(np.asarray(fits.any(axis=0)))], THREE_EQUATIONS)
     best = int(np.argmin(costs))
     # but a pair that fits the best must fit the third picture, too
     pair = pairs[:, best].min(axis=0)

@@ -139,7 +139,7 @@ def _judged(
 ) -> Attempt:
     """Triangulate, and say what is missing for a start."""
     choice, reason = found.choice, found.reason if third is None else third.reason
-    T_b_a, fit = found.T_b_a, _Fit(np.inf, found.inliers)
+    T_b_a, fit = found.T_b_a, _Fit(np.inf if choice is None else choice.cost, found.inliers)
     if third is not None and third.views is not None and choice is not None:
         T_b_a = third.views.T_b_a
         fit = _fit(camera, T_b_a, choice, pair)

@@ -61,12 +61,12 @@ class Trails:
     @property
     def first(self) -> Array:
         """Places in the first picture (n, 2), pixels."""
-        return self.places[0]
+        return np.asarray(self.places[0])
 
     @property
     def now(self) -> Array:
         """Places in the newest picture (n, 2), pixels."""
-        return self.places[-1]
+        return np.asarray(self.places[-1])
 
     @property
     def moved(self) -> Array:
