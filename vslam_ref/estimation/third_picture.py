@@ -213,7 +213,8 @@ def refine_three(
 ) -> ThreeViews:
     """Motion, pose between and inverse depths with the smallest robust distances, near an answer.
 
-    Implements :eq:`eq-three-views` and :eq:`eq-third-picture`.  Parameters and errors as for :func:`ask_third`, with one ``T_b_a``.
+    Implements :eq:`eq-three-views` and :eq:`eq-third-picture`.  Parameters and errors as for
+    :func:`ask_third`, with one ``T_b_a``.
     """
     a, m = checked_pairs(xn_a, xn_m, LEAST)
     _, b = checked_pairs(xn_a, xn_b, LEAST)
