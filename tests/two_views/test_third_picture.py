@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from vslam_ref.estimation import third_picture
 from vslam_ref.estimation.third_picture import ask_third, refine_three
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview import two_views
@@ -150,6 +151,17 @@ def test_far_points_stay_in_front_and_do_no_harm() -> None:
     assert (found.views.inverse_depth == 0.0).sum() > 20  # half of the far ones would lie behind
     assert found.inliers.mean() > 0.85
     assert apart(found.views.T_b_a, s.T_b_a) < 0.05
+
+
+@pytest.mark.parametrize(("w", "error", "wanted"), [(0.0, -1.0, 1.0), (0.0, 1.0, 0.0), (2.0, 1.0, -1.0)])
+def test_from_infinity_a_point_comes_nearer_and_goes_no_farther(
+    w: float, error: float, wanted: float
+) -> None:
+    """One point whose error grows by one for each unit of inverse depth: Newton's step is minus the error."""
+    along = np.array([[1.0, 0.0, 0.0, 0.0]])
+    now = third_picture._Linear(error * along, np.zeros((1, 4, 11)), along, np.ones(1))
+    step = third_picture._step(now, np.ones(1), np.array([w]), 1e-3)
+    assert step.inverse_depth[0] == pytest.approx(wanted, abs=1e-12)
 
 
 def test_wrong_matches_in_any_picture_change_little() -> None:

@@ -214,7 +214,7 @@ def refine_three(
     """Motion, pose between and inverse depths with the smallest robust distances, near an answer.
 
     Implements :eq:`eq-three-views` and :eq:`eq-third-picture`.  Parameters and errors as for
-    :func:`ask_third`, with one ``T_b_a``.
+    :func:`ask_third`, with one start ``T_start (4, 4)``, from a to b.
     """
     a, m = checked_pairs(xn_a, xn_m, LEAST)
     _, b = checked_pairs(xn_a, xn_b, LEAST)

@@ -149,6 +149,8 @@ def plane_motion(a: SmallImage, b: SmallImage) -> PlaneMotion:
 def moved_by(motion: PlaneMotion, small: SmallImage, uv: ArrayLike) -> Array:
     """Where points of the first image lie in the second, if all of it moved as the small images say.
 
+    Implements :eq:`eq-small-image`, its motion put to use.
+
     Parameters
     ----------
     motion : PlaneMotion

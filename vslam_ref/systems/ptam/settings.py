@@ -51,7 +51,7 @@ class StartSettings:
     parallax: float = assume(0.7, "degrees", "median; forward motion never reaches 1.5")
     wide_parallax: float = assume(1.0, "degrees", "of the points that make the map")
     wide_points: int = assume(45, "points", "with that parallax at least")
-    cost: float = assume(0.25, "px^2 per point", "Sampson distance squared, of inliers and outliers alike")
+    cost: float = assume(0.25, "px^2 per pair", "Sampson distance squared, of inliers and outliers alike")
     keep: float = assume(
         0.6, "share", "of the trails that must survive following from the first picture again"
     )

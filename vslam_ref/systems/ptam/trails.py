@@ -102,7 +102,10 @@ def begin(picture: PreparedPicture, s: StartSettings, f: FeatureSettings) -> Tra
 
 
 def go_on(trails: Trails, picture: PreparedPicture, s: StartSettings) -> Trails:
-    """Follow all trails into the next picture; those that are lost end."""
+    """Follow all trails into the next picture; those that are lost end.
+
+    Implements :eq:`eq-home`, pixels of level 0.
+    """
     went = None
     if len(trails.pictures) > 1:
         went = _step(trails, picture, trails.now + trails.speed, s.search_radius)
