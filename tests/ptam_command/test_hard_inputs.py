@@ -89,7 +89,7 @@ def test_bad_pictures_at_the_beginning_and_wrong_order_do_not_hinder_the_start(
     ("image", "reason"),
     [
         (np.full((240, 320), 90, np.uint8), "0 corners in a picture: need 80"),
-        (small_world.picture(0), "corners moved by 0.00 px (median): a start is tried from 8 px on"),
+        (small_world.picture(0), "the corners have moved 0.00 px: need 8"),
     ],
     ids=["bare", "still"],
 )

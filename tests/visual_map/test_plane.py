@@ -134,17 +134,6 @@ def test_where_there_is_no_plane_a_reason_says_so(X: np.ndarray, reason: str) ->
     np.testing.assert_array_equal(got.T_plane_world, np.eye(4))
 
 
-def test_samples_are_three_different_points_all_equally_likely() -> None:
-    """40000 draws of 3 out of 5: each of the 60 ordered triples 667 times, with a
-    standard deviation of 25.6; 5 of these.
-    """
-    drawn = plane._samples(5, 40_000, np.random.default_rng(0))
-    triples, count = np.unique(drawn, axis=0, return_counts=True)
-    assert len(triples) == 60
-    assert all(len(set(row)) == 3 for row in triples.tolist())
-    assert np.abs(count - 40_000 / 60).max() < 5 * 25.6
-
-
 @pytest.mark.parametrize(
     ("X", "more", "what"),
     [

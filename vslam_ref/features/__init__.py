@@ -25,7 +25,14 @@ from vslam_ref.features.following import Followed, View, follow
 from vslam_ref.features.levels import finest_from_level, halve, level_from_finest, level_sigma, pyramid
 from vslam_ref.features.patch_search import Found, search, zmssd, zncc
 from vslam_ref.features.refinement import Refined, State, refine
-from vslam_ref.features.small_images import PlaneMotion, SmallImage, plane_motion, rotation, small_image
+from vslam_ref.features.small_images import (
+    PlaneMotion,
+    SmallImage,
+    moved_by,
+    plane_motion,
+    rotation,
+    small_image,
+)
 from vslam_ref.features.templates import Templates, cut, sampling, search_level, warp
 
 __all__ = [
@@ -47,6 +54,7 @@ __all__ = [
     "is_peak",
     "level_from_finest",
     "level_sigma",
+    "moved_by",
     "plane_motion",
     "pyramid",
     "refine",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
-from vslam_ref.features.levels import finest_from_level, grey, halve
+from vslam_ref.features.levels import finest_from_level, grey, halve, level_from_finest
 from vslam_ref.features.templates import bilinear
 from vslam_ref.geometry import se2
 from vslam_ref.geometry.cameras import Camera
@@ -144,6 +144,38 @@ def plane_motion(a: SmallImage, b: SmallImage) -> PlaneMotion:
             reason = ""
             break
     return PlaneMotion(T, rms, reason)
+
+
+def moved_by(motion: PlaneMotion, small: SmallImage, uv: ArrayLike) -> Array:
+    """Where points of the first image lie in the second, if all of it moved as the small images say.
+
+    Implements :eq:`eq-small-image`, its motion put to use.
+
+    Parameters
+    ----------
+    motion : PlaneMotion
+    small : SmallImage
+        One of the two, for size and level.
+    uv : array_like, shape (N, 2)
+        Pixels of level 0 in the first image.
+
+    Returns
+    -------
+    ndarray, shape (N, 2)
+        Pixels of level 0 in the second image.
+
+    Examples
+    --------
+    >>> small = SmallImage(np.zeros((30, 40)), 4)
+    >>> shift = np.array([[1.0, 0, 2.0], [0, 1, 0], [0, 0, 1]])  # 2 pixels of level 4 to the right
+    >>> moved_by(PlaneMotion(shift, 0.0, ""), small, [[100.0, 50.0]]).tolist()
+    [[132.0, 50.0]]
+    """
+    height, width = small.value.shape
+    middle = np.array([(width - 1) / 2, (height - 1) / 2])
+    offset = level_from_finest(np.asarray(uv, np.float64), small.level) - middle
+    T = motion.T_b_a
+    return finest_from_level(offset @ T[:2, :2].T + T[:2, 2] + middle, small.level)
 
 
 def rotation(camera: Camera, shape: tuple[int, int], level: int, T_b_a: ArrayLike) -> Array:

@@ -10,6 +10,7 @@ module                    elements
 :mod:`.sim3`              the same with a scale, matrices (..., 4, 4)
 :mod:`.quaternion`        rotations of space, unit quaternions (..., 4), w first
 :mod:`.camera_pose`       a camera's centre, its pose, its next pose
+:mod:`.drawing`           samples of different numbers
 :mod:`.multiview`         points from several views, and views from points
 ========================  ==========================================================================
 

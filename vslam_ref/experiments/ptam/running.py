@@ -22,7 +22,7 @@ from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
-from vslam_ref.systems.ptam.trails import Trails
+from vslam_ref.systems.ptam.trails import FIRST, Trails
 
 UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
 STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)
@@ -202,7 +202,7 @@ def _one(done: Run, image: Image) -> Frame:
     """Give one picture to the system."""
     if image.grey is None:
         return Frame(image.number, image.time, UNUSABLE)
-    had_map, before = done.system.map is not None, done.system.trails
+    had_map = done.system.map is not None
     began = time.perf_counter()
     outcome = done.system.step(image.number, image.grey)
     seconds = time.perf_counter() - began
@@ -212,7 +212,7 @@ def _one(done: Run, image: Image) -> Frame:
     if not had_map and done.system.map is not None and isinstance(outcome.attempt, Attempt):
         done.start = outcome.attempt
         return frame._replace(state=START, keyframe=True, marks=_start_marks(outcome.attempt))
-    return _waited(done, frame, outcome, 0 if before is None else len(before.pictures))
+    return _waited(done, frame, outcome)
 
 
 def _tracked(frame: Frame, outcome: PictureOutcome, tracked: Tracked) -> Frame:
@@ -239,27 +239,19 @@ def _start_marks(attempt: Attempt) -> Marks:
     return Marks(uv, attempt.level[good].astype(np.uint8), first)
 
 
-def _waited(done: Run, frame: Frame, outcome: PictureOutcome, before: int) -> Frame:
-    """No map yet: note the reason, and the trails to be drawn, which had run over ``before`` pictures."""
-    trails, start = done.system.trails, done.settings.start
+def _waited(done: Run, frame: Frame, outcome: PictureOutcome) -> Frame:
+    """No map yet: note the reason, and the trails to be drawn."""
+    trails = done.system.trails
     if done.system.chosen is not None:
         return frame if trails is None else frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
     if isinstance(outcome.attempt, Attempt):
         done.refused(outcome.attempt.reason)
     elif outcome.attempt is not None:
         done.refused(outcome.attempt)
+    if outcome.waiting and outcome.waiting != FIRST:
+        done.refused(outcome.waiting)
     if trails is None or len(trails.pictures) < 2:
-        count = 0 if trails is None else len(trails.now)
-        if count < start.least_trails:
-            done.refused(f"{count} corners in a picture: need {start.least_trails}")
-        elif 0 < before < start.patience:
-            done.refused("too few corners were found again in the next picture: begun anew")
         return frame
-    if outcome.attempt is None and trails.length < start.least_motion:
-        moved = f"corners moved by {trails.length:.2f} px (median)"
-        done.refused(f"{moved}: a start is tried from {start.least_motion:g} px on")
-    elif outcome.attempt is None:
-        done.refused("corners were followed over too few pictures")
     return frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
 
 

@@ -80,16 +80,13 @@ def motion(x_a: Array, x_b: Array, sigma: float, rng: np.random.Generator) -> Ar
     return min(four, key=lambda T: sum(costs(T, x_a, x_b, sigma)))
 
 
-def missing(parallax: list[float], cost: float, depths: list[float], s: StartSettings) -> str:
-    """Why two pictures are no start, or nothing: angles in degrees, px^2 a point, depths of one unit."""
+def missing(parallax: list[float], cost: float, s: StartSettings) -> str:
+    """Why two pictures are no start, or nothing: angles in degrees, px^2 a point."""
     if np.median(parallax) < s.parallax:
         return "the rays of a point differ too little"
     if sum(angle >= s.wide_parallax for angle in parallax) < s.wide_points:
         return "too few points have parallax"
-    if cost > s.cost:
-        return "the cost is too high"
-    near, far = np.percentile(depths, [10, 90])
-    return "" if far >= s.depth_spread * near else "the depths are too much alike"  # eq-start-accepted
+    return "the cost is too high" if cost > s.cost else ""  # eq-start-accepted
 
 
 def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Generator) -> BookMap | str:
@@ -111,7 +108,7 @@ def begin(camera: Camera, pictures: list[PreparedPicture], rng: np.random.Genera
     adjust(made, {1}, set(made.X))
     parallax = [angle(camera, made.poses[1], places) for places in fits]
     cost = float(np.mean(costs(made.poses[1], x_a, x_b, sigma)))
-    reason = missing(parallax, cost, [X[2] for X in made.X.values()], S.start)
+    reason = missing(parallax, cost, S.start)
     if reason:
         return reason
     new_points(made, 1)

@@ -75,6 +75,8 @@ class PictureOutcome(NamedTuple):
         If it became a keyframe.
     attempt : Attempt or str or None
         Of a start, if one was tried; a sentence where there was nothing to try.
+    waiting : str
+        Why no start was even tried; empty where one was, or where there is a map.
     queued : bool
         Whether it was handed to a mapper in another thread, to become a keyframe.
     stages : mapping of str to float
@@ -85,6 +87,7 @@ class PictureOutcome(NamedTuple):
     tracked: Tracked | None = None
     mapped: MappedKeyframe | None = None
     attempt: Attempt | str | None = None
+    waiting: str = ""
     queued: bool = False
     stages: Mapping[str, float] = MappingProxyType({})
 
@@ -157,20 +160,19 @@ class Ptam:
         s, f = self.settings.start, self.settings.features
         if self.trails is not None:
             self.trails = trail_steps.go_on(self.trails, picture, s)
-        worn = self.trails is None or len(self.trails.now) < s.least_trails
-        if worn or len(self.trails.pictures) > s.patience:  # type: ignore[union-attr]
+        if self.trails is None or trail_steps.worn(self.trails, s):
+            why = trail_steps.worn(self.trails, s)
             self.trails = trail_steps.begin(picture, s, f)
-            return PictureOutcome(picture.number)
-        assert self.trails is not None
-        if self.trails.length < s.least_motion or len(self.trails.pictures) <= s.least_pictures:
-            return PictureOutcome(picture.number)
+            return PictureOutcome(picture.number, waiting=trail_steps.too_few(self.trails, s) or why)
+        if waiting := trail_steps.too_early(self.trails, s):
+            return PictureOutcome(picture.number, waiting=waiting)
         found = attempt(self.camera, self.trails, s, self.rng)
         if isinstance(found, str):
             return PictureOutcome(picture.number, attempt=found)
         if not found.reason:
             self._start(found)
-        elif found.agrees.sum() > s.keep * len(self.trails.now):
-            self.trails = self.trails.only(found.row[found.agrees], found.uv_b[found.agrees])
+        elif len(found.row) > s.keep * len(self.trails.now):
+            self.trails = self.trails.only(found.row, found.uv_b)
         return PictureOutcome(picture.number, attempt=found)
 
     def _towards(self, chosen: ChosenStart, picture: PreparedPicture) -> PictureOutcome:

@@ -41,7 +41,12 @@ class StartSettings:
 
     trails: int = assume(800, "points", "PTAM starts with 1000 corners")
     least_trails: int = assume(80, "points", "fewer: the trails begin anew")
-    search_radius: float = assume(12.0, "px", "from picture to picture, around where it was going")
+    search_radius: float = assume(
+        12.0, "px", "from picture to picture, around where it was going; twice as far while that is unknown"
+    )
+    found_again: float = assume(
+        0.5, "share", "fewer found: the picture turned, and the small images may know how"
+    )
     least_motion: float = assume(8.0, "px", "median length of the trails before a start is tried")
     least_pictures: int = assume(
         6, "pictures", "a rolling shutter makes parallax out of a quick turn; the true one grows with time"
@@ -49,10 +54,7 @@ class StartSettings:
     parallax: float = assume(0.7, "degrees", "median; forward motion never reaches 1.5")
     wide_parallax: float = assume(1.0, "degrees", "of the points that make the map")
     wide_points: int = assume(45, "points", "with that parallax at least")
-    cost: float = assume(0.25, "px^2 per point", "Sampson distance squared, of inliers and outliers alike")
-    depth_spread: float = assume(
-        1.25, "ratio of the 90 % to the 10 % depth", "one depth is a plane: nothing is known"
-    )
+    cost: float = assume(0.25, "px^2 per pair", "Sampson distance squared, of inliers and outliers alike")
     keep: float = assume(
         0.6, "share", "of the trails that must survive following from the first picture again"
     )

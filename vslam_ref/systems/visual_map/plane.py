@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
+from vslam_ref.geometry.drawing import different_numbers
 
 SHARE = 0.075
 """Of the points' median distance from their middle: how far from a plane a point may lie by default."""
@@ -105,7 +106,7 @@ def dominant_plane(
     if c == 0:
         return _none(len(X), "most points lie at one place")
     vote = _votes(X, CELL * c)
-    n, h = _best_sample(X, vote, c, _samples(len(X), draws, rng))
+    n, h = _best_sample(X, vote, c, different_numbers(rng, draws, len(X), 3))
     if not n.any():
         return _none(len(X), "all samples of three points lie on a line")
     inside = _within(X, n, h, c)
@@ -146,17 +147,6 @@ def _votes(X: Array, side: float) -> Array:
     """One over the number of points in the same cell, (N,)."""
     _, cell, count = np.unique(np.floor(X / side), axis=0, return_inverse=True, return_counts=True)
     return 1.0 / count[cell.ravel()]
-
-
-def _samples(count: int, draws: int, rng: np.random.Generator) -> IntArray:
-    """Three different numbers below ``count`` a row, shape (draws, 3)."""
-    drawn = rng.integers(0, count - np.arange(3), (draws, 3))
-    first, second, third = drawn.T
-    second = second + (second >= first)
-    low, high = np.minimum(first, second), np.maximum(first, second)
-    third = third + (third >= low)
-    third = third + (third >= high)
-    return np.stack([first, second, third], 1)
 
 
 def _best_sample(X: Array, vote: Array, c: float, samples: IntArray) -> tuple[Array, float]:

@@ -50,6 +50,8 @@ class Choice:
         Angles between the rays, radians.
     reason : str
         Empty if the best is clearly the best; else which rival stands in the way.
+    answers : ndarray, shape (1 + rivals, 4, 4)
+        The motions of the best and of the rivals, in their order; translations of length 1.
     """
 
     T_b_a: Array
@@ -60,6 +62,7 @@ class Choice:
     front: BoolArray
     parallax: Array
     reason: str
+    answers: Array
 
 
 def choose(
@@ -115,13 +118,20 @@ def choose(
         if min(apart(T[k], T[j]) for j in seen) >= SAME_VALLEY:
             rivals.append((names[k], float(costs[k])))
             seen.append(k)
-    length = np.linalg.norm(T[best, :3, 3])
-    chosen = se3.from_rt(T[best, :3, :3], T[best, :3, 3] / (length if length > 0 else 1.0))
-    cost = float(costs[best])
-    inliers = at.squared[best] <= ONE_EQUATION
-    reason = _reason(names[best], cost, rivals)
-    parallax = at.parallax[best]
-    return Choice(chosen, names[best], cost, tuple(rivals), inliers, at.front[best], parallax, reason)
+    answers = T[seen]
+    length = np.linalg.norm(answers[:, :3, 3], axis=-1, keepdims=True)
+    answers[:, :3, 3] /= np.where(length > 0, length, 1.0)
+    return Choice(
+        T_b_a=answers[0],
+        name=names[best],
+        cost=float(costs[best]),
+        rivals=tuple(rivals),
+        inliers=at.squared[best] <= ONE_EQUATION,
+        front=at.front[best],
+        parallax=at.parallax[best],
+        reason=_reason(names[best], float(costs[best]), rivals),
+        answers=answers,
+    )
 
 
 def apart(T: ArrayLike, S: ArrayLike) -> float:

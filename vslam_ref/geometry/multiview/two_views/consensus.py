@@ -27,12 +27,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.geometry.drawing import different_numbers
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma
 from vslam_ref.geometry.multiview.two_views.eight_point import linear_essential
 from vslam_ref.geometry.multiview.two_views.five_point import five_point_essentials
 from vslam_ref.geometry.multiview.two_views.homography import fit_homography
-from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_squared
 
 ONE_EQUATION, TWO_EQUATIONS = 3.841458820694124, 5.991464547107979
 """What chi-square of one and of two degrees of freedom stays below with probability 0.95."""
@@ -212,7 +213,7 @@ def _consensus(
     if len(a) < kind.size:
         return Consensus(best, inliers, cost, 0, False, f"{len(a)} pairs: need at least {kind.size}")
     while drawn < min(max(needed, draws.least), draws.most):
-        rows = _samples(rng, min(draws.batch, draws.most - drawn), len(a), kind.size)
+        rows = different_numbers(rng, min(draws.batch, draws.most - drawn), len(a), kind.size)
         drawn += len(rows)
         candidate, price = _cheapest(kind.models(a[rows], b[rows]), a, b, sigma, kind)
         if price < cost:
@@ -243,22 +244,9 @@ def _improved(
     return (other, price) if price < cost else (model, cost)
 
 
-def _samples(rng: np.random.Generator, count: int, n: int, size: int) -> IntArray:
-    """Rows (count, size) of different indices below n."""
-    if n <= 4 * size:
-        return np.argsort(rng.random((count, n)), axis=1)[:, :size]
-    rows = rng.integers(n, size=(count, size))
-    while True:
-        ordered = np.sort(rows, axis=1)
-        twice = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
-        if not twice.any():
-            return rows
-        rows[twice] = rng.integers(n, size=(int(twice.sum()), size))
-
-
 def _squared_E(E: Array, a: Array, b: Array) -> Array:
     return np.asarray(essential_sampson(E, a, b) ** 2)
 
 
 def _squared_H(H: Array, a: Array, b: Array) -> Array:
-    return np.asarray(np.sum(homography_sampson(H, a, b) ** 2, axis=-1))
+    return homography_squared(H, a, b)

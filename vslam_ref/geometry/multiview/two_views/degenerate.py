@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma, homogeneous
-from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_squared
 
 MAP, LINES = 2, 3
 """Dimension of the manifold of pairs of a map from picture to picture, and of an epipolar geometry."""
@@ -140,4 +140,4 @@ def best_rotation(xn_a: ArrayLike, xn_b: ArrayLike) -> Array:
 
 
 def _map(H: Array, a: Array, b: Array, sigma: float) -> Array:
-    return np.asarray(np.sum(homography_sampson(H, a, b) ** 2, axis=-1) / sigma**2)
+    return np.asarray(homography_squared(H, a, b) / sigma**2)

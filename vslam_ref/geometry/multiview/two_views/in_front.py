@@ -25,7 +25,7 @@ from vslam_ref.arrays import Array, BoolArray, as_array, times
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview.epipolar import essential_from_motion
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma, homogeneous
-from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_sampson
+from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_squared
 
 
 class Cheirality(NamedTuple):
@@ -83,7 +83,7 @@ def cheirality(T_b_a: ArrayLike, xn_a: ArrayLike, xn_b: ArrayLike, sigma: float 
     b, t = homogeneous(xb), se3.translation(T)[..., None, :]
     across = np.cross(a, b)
     front = (np.sum(across * np.cross(b, t), axis=-1) > 0) & (np.sum(across * np.cross(a, t), axis=-1) > 0)
-    at_infinity = np.sum(homography_sampson(se3.rotation(T), xa, xb) ** 2, axis=-1)
+    at_infinity = homography_squared(se3.rotation(T), xa, xb)
     on_line = essential_sampson(essential_from_motion(T), xa, xb) ** 2
     # to first order the constraint of infinity holds the epipolar one; rounding must not make it cheaper
     squared = np.where(front, on_line, np.maximum(at_infinity, on_line)) / sigma**2

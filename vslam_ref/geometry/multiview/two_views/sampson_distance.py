@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array, as_array, times, transpose
+from vslam_ref.arrays import Array, BoolArray, as_array, times, transpose
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.multiview._rays import across
 from vslam_ref.geometry.multiview.two_views._pairs import homogeneous
@@ -60,7 +60,9 @@ def sampson(T_b_a: ArrayLike, xn_a: ArrayLike, xn_b: ArrayLike) -> Array:
 
     Parameters and errors as for :func:`sampson_with_jacobians`.  Implements :eq:`eq-sampson`.
     """
-    return sampson_with_jacobians(T_b_a, xn_a, xn_b).residual
+    T = as_array("T_b_a", T_b_a, 4, 4)
+    E = so3.hat(_direction(T)) @ se3.rotation(T)
+    return _signed(E, as_array("xn_a", xn_a, 2), as_array("xn_b", xn_b, 2))[..., None]
 
 
 def sampson_with_jacobians(T_b_a: ArrayLike, xn_a: ArrayLike, xn_b: ArrayLike) -> SampsonJacobians:
@@ -117,11 +119,23 @@ def essential_sampson(E: ArrayLike, xn_a: ArrayLike, xn_b: ArrayLike) -> Array:
 
     Implements :eq:`eq-sampson`, for many matrices at once; E has any unit, the answer that of the positions.
     """
-    E = as_array("E", E, 3, 3)
-    a, b = homogeneous(as_array("xn_a", xn_a, 2)), homogeneous(as_array("xn_b", xn_b, 2))
-    line_b, line_a = a @ transpose(E), b @ E
-    value = np.sum(b * line_b, axis=-1)
-    square = line_b[..., 0] ** 2 + line_b[..., 1] ** 2 + line_a[..., 0] ** 2 + line_a[..., 1] ** 2
+    E = as_array("E", E, 3, 3)[..., None, :, :]
+    return _signed(E, as_array("xn_a", xn_a, 2), as_array("xn_b", xn_b, 2))
+
+
+def _signed(c: Array, xn_a: Array, xn_b: Array) -> Array:
+    """Signed distances (...) of ``xn (..., 2)`` from matrices ``c (..., 3, 3)``, a component at a time.
+
+    Thousands of models are judged on hundreds of pairs: sums over axes of length three would take most of it.
+    """
+    a, b, u, v = xn_a[..., 0], xn_a[..., 1], xn_b[..., 0], xn_b[..., 1]
+    first = c[..., 0, 0] * a + c[..., 0, 1] * b + c[..., 0, 2]  # the line E x_a
+    second = c[..., 1, 0] * a + c[..., 1, 1] * b + c[..., 1, 2]
+    third = c[..., 2, 0] * a + c[..., 2, 1] * b + c[..., 2, 2]
+    back_first = c[..., 0, 0] * u + c[..., 1, 0] * v + c[..., 2, 0]  # the line E' x_b
+    back_second = c[..., 0, 1] * u + c[..., 1, 1] * v + c[..., 2, 1]
+    square = first**2 + second**2 + back_first**2 + back_second**2
+    value = u * first + v * second + third
     return np.asarray(value / np.sqrt(np.where(square > 0, square, np.inf)))
 
 
@@ -148,21 +162,55 @@ def homography_sampson(H: ArrayLike, x_a: ArrayLike, x_b: ArrayLike) -> Array:
     [[0.0, 0.141421356]]
     """
     H, a, b = as_array("H", H, 3, 3), as_array("x_a", x_a, 2), as_array("x_b", x_b, 2)
-    Y = homogeneous(a) @ transpose(H)
-    front = Y[..., 2] > 0
-    depth = np.where(front, Y[..., 2], 1.0)
-    y = Y[..., :2] / depth[..., None]
-    error = y - b
-    rest = H[..., None, :2, :2] - y[..., :, None] * H[..., None, 2:, :2]
-    J = rest / depth[..., None, None]  # of H x_a in x_a; in x_b it is minus the identity
-    # J J' + I = L L', and the residual is L^-1 times the error; its determinant by a sum, not a difference
-    first = np.sqrt(1.0 + np.sum(J[..., 0, :] ** 2, axis=-1))
-    below = np.sum(J[..., 0, :] * J[..., 1, :], axis=-1) / first
-    det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
-    second = np.sqrt(1.0 + np.sum(J**2, axis=(-2, -1)) + det**2) / first
-    r0 = error[..., 0] / first
-    r1 = (error[..., 1] - below * r0) / second
-    return np.asarray(np.where(front[..., None], np.stack([r0, r1], axis=-1), np.inf))
+    at = _map_errors(H, a, b)
+    # the residual is L^-1 times the error, with L L' the matrix ((p, q), (q, r))
+    first = np.sqrt(at.p)
+    below = at.q / first
+    r0 = at.u / first
+    r1 = (at.v - below * r0) / (np.sqrt(at.det) / first)
+    return np.asarray(np.where(at.front[..., None], np.stack([r0, r1], axis=-1), np.inf))
+
+
+def homography_squared(H: ArrayLike, x_a: ArrayLike, x_b: ArrayLike) -> Array:
+    """Squared length (..., N) of :func:`homography_sampson`, in the squared unit of the positions.
+
+    Parameters and errors as there.  Implements :eq:`eq-homography-sampson`.
+
+    >>> homography_squared(np.eye(3), [[0.0, 0.0]], [[0.0, -0.2]]).round(9).tolist()
+    [0.02]
+    """
+    at = _map_errors(as_array("H", H, 3, 3), as_array("x_a", x_a, 2), as_array("x_b", x_b, 2))
+    squared = (at.r * at.u**2 - 2.0 * at.q * at.u * at.v + at.p * at.v**2) / at.det
+    return np.asarray(np.where(at.front, squared, np.inf))
+
+
+class _MapErrors(NamedTuple):
+    """Errors u, v of mapped points, I + J J' as (p, q; q, r) and its determinant, and which lie in front."""
+
+    u: Array
+    v: Array
+    p: Array
+    q: Array
+    r: Array
+    det: Array
+    front: BoolArray
+
+
+def _map_errors(H: Array, a: Array, b: Array) -> _MapErrors:
+    """How homographies map points, (..., N) each; a component at a time, as in :func:`_signed`."""
+    h, x, y = H[..., None, :, :], a[..., 0], a[..., 1]
+    depth = h[..., 2, 0] * x + h[..., 2, 1] * y + h[..., 2, 2]
+    front = depth > 0
+    scale = 1.0 / np.where(front, depth, 1.0)
+    u = (h[..., 0, 0] * x + h[..., 0, 1] * y + h[..., 0, 2]) * scale
+    v = (h[..., 1, 0] * x + h[..., 1, 1] * y + h[..., 1, 2]) * scale
+    # J of H x_a in x_a; in x_b it is minus the identity
+    J_ux, J_uy = (h[..., 0, 0] - u * h[..., 2, 0]) * scale, (h[..., 0, 1] - u * h[..., 2, 1]) * scale
+    J_vx, J_vy = (h[..., 1, 0] - v * h[..., 2, 0]) * scale, (h[..., 1, 1] - v * h[..., 2, 1]) * scale
+    p, q, r = 1.0 + J_ux**2 + J_uy**2, J_ux * J_vx + J_uy * J_vy, 1.0 + J_vx**2 + J_vy**2
+    # det(I + J J') by a sum, not a difference
+    det = p + r - 1.0 + (J_ux * J_vy - J_uy * J_vx) ** 2
+    return _MapErrors(u - b[..., 0], v - b[..., 1], p, q, r, det, front)
 
 
 def _direction(T: Array) -> Array:

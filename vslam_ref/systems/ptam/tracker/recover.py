@@ -9,6 +9,7 @@ import numpy as np
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
 from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.drawing import different_numbers
 from vslam_ref.geometry.multiview.three_points import p3p
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
 
@@ -61,7 +62,7 @@ def by_three_points(
     use = np.flatnonzero(rays.valid)
     if len(use) < 8:
         return None
-    sample = np.array([rng.choice(use, 3, replace=False) for _ in range(draws)])
+    sample = use[different_numbers(rng, draws, len(use), 3)]
     found = p3p(rays.bearing[sample], X_world[sample])
     T = found.T_cam_world[found.valid]
     if len(T) == 0:
