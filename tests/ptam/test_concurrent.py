@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -243,13 +244,17 @@ def test_without_a_start_there_is_no_thread(film: Film) -> None:
 def test_twenty_runs_over_whole_desks(seed: int) -> None:
     """Five runs over each of four desks, 600 pictures of 640 x 480, in the bounds of the interleaved form.
 
-    ``pytest -m slow tests/ptam/test_concurrent.py -n 1``: ten minutes.
+    In the first, pictures come as fast as they are taken; in the others at random moments, up to 50 ms apart,
+    so that the threads meet differently each time.
+    ``pytest -m slow tests/ptam/test_concurrent.py -n 1``: twenty minutes.
     """
+    rng = np.random.default_rng(seed)
     world = scene("desk", seed)
     pictures = [world.frame(k) for k in range(len(world))]
-    for _ in range(5):
+    for again in range(5):
         system = ConcurrentPtam(world.camera)
         for k, grey in enumerate(pictures):
+            time.sleep(rng.uniform(0.0, 0.05) if again else 0.0)
             system.step(k, grey)
         system.finish()
         numbers, T = system.trajectory()

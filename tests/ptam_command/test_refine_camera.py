@@ -14,6 +14,7 @@ import small_world
 
 from vslam_ref.datasets.calibration_files import read_opencv
 from vslam_ref.datasets.sequences import read_camera
+from vslam_ref.experiments.ptam import overlay
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
 from vslam_ref.systems.ptam import refine_camera
@@ -142,6 +143,26 @@ def test_the_shift_of_a_pixel_is_told_and_what_a_second_run_would_change(
     page = (refined.out / "report.html").read_text()
     assert "The camera" in page
     assert "camera.yaml" in page
+
+
+def test_the_house_stands_where_the_refined_camera_shows_it(
+    refined: Refined, run: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    def view_of(camera: Camera, *more: Any) -> Any:
+        seen.append(camera)
+        return real(camera, *more)
+
+    real = overlay.view_of
+    monkeypatch.setattr(overlay, "view_of", view_of)
+    words = ["--refine-camera", "--to", 40, "--json", tmp_path / "n.json"]
+    assert run(refined.source, "--out", tmp_path / "out", *words) == 0
+    n = json.loads((tmp_path / "n.json").read_text())
+    found = [n["camera"]["refined"][name] for name in Radtan.names()]
+    assert n["camera"]["reason"] == ""
+    assert len(seen) > 30
+    assert all(camera.params.tolist() == found for camera in seen)
 
 
 def test_a_camera_that_passes_by_without_turning_shows_no_focal_length_and_no_centre(

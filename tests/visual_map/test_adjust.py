@@ -10,7 +10,9 @@ import pytest
 from vslam_ref.estimation.bundle import Options, Robust
 from vslam_ref.estimation.robust import tuned
 from vslam_ref.geometry import camera_pose, se3
-from vslam_ref.systems.visual_map import VisualMap, adjust, local_active
+from vslam_ref.geometry.cameras import Pinhole
+from vslam_ref.systems.visual_map import VisualMap, adjust, adjust_with_camera, local_active
+from vslam_ref.systems.visual_map.visual_map import slopes
 
 MakeMap = Callable[..., VisualMap]
 TUKEY = Robust(tuned("tukey", 2), "adaptive", 0.4)
@@ -82,3 +84,34 @@ def test_a_local_adjustment_leaves_the_others_alone(make_map: MakeMap) -> None:
     np.testing.assert_array_equal(visual_map.X_world[rest], truth.X_world[rest] + 0.001)
     assert np.abs(visual_map.X_world - truth.X_world)[points].max() < 1e-5  # the ring holds the scale, too
     assert np.abs(visual_map.T_kf_world - truth.T_kf_world).max() < 1e-5
+
+
+def test_with_the_camera_free_an_exact_map_gets_its_camera_back(make_map: MakeMap) -> None:
+    """Sightings without error, a wrong camera: poses, points, camera and slopes fit again, to 1e-6."""
+    visual_map = make_map(7, 80)
+    true = visual_map.camera
+    wrong = Pinhole(1.02 * true.fx, 0.99 * true.fy, true.cx + 1.0, true.cy - 1.5)
+    visual_map.change_camera(wrong)
+    source = visual_map.points["source_uv"]
+    np.testing.assert_array_equal(visual_map.points["slope"], slopes(wrong, source))
+    adjust(visual_map, Robust(), options=TIGHT)  # the world bends itself to the wrong camera
+    found = adjust_with_camera(
+        visual_map, wrong, ("fx", "fy", "cx", "cy"), Robust(), most_shift_px=5.0, options=Options(cost=1e-12)
+    )
+    assert found.reason == ""
+    np.testing.assert_allclose(visual_map.camera.params, true.params, rtol=1e-6)
+    seen = visual_map.sightings
+    at = true.pixel_from_world(visual_map.T_kf_world[seen["kf"]], visual_map.X_world[seen["point"]])
+    assert np.abs(at.uv - seen["uv"])[seen["on"]].max() < 1e-3
+    np.testing.assert_allclose(visual_map.points["slope"], slopes(true, source), atol=1e-8)
+
+
+def test_a_camera_that_is_not_found_changes_nothing(make_map: MakeMap) -> None:
+    visual_map = make_map(7, 80)
+    before = visual_map.T_kf_world.copy(), visual_map.X_world.copy(), visual_map.camera
+    visual_map.sightings["uv"][:] += np.random.default_rng(0).normal(0, 0.3, visual_map.sightings["uv"].shape)
+    found = adjust_with_camera(visual_map, visual_map.camera, ("fx", "cx"), Robust(), most_shift_px=1e-6)
+    assert found.reason == "the views determine no intrinsic"
+    assert np.array_equal(visual_map.T_kf_world, before[0])
+    assert np.array_equal(visual_map.X_world, before[1])
+    assert visual_map.camera is before[2]

@@ -76,9 +76,9 @@ def refine_camera(visual_map: VisualMap, settings: Settings) -> RefinedCamera:
     found = adjust_with_camera(
         visual_map, start, names, robust(settings), most_shift_px=s.most_shift, options=options(s.steps)
     )
-    camera = given if found.reason else without_lens_terms(given, found.camera, found.refused)
-    if not found.reason:
-        visual_map.change_camera(camera)
+    camera = without_lens_terms(given, visual_map.camera, found.refused)
+    if camera is not visual_map.camera:
+        visual_map.change_camera(camera)  # a pinhole again
     height, width = visual_map.shape
     shift = pixel_shift(given, camera, (width, height))
     return RefinedCamera(given, camera, found.sigma, found.refused, found.reason, shift, before)
