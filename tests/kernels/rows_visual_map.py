@@ -9,6 +9,9 @@ import numpy as np
 
 from vslam_ref.features.corners import detect
 from vslam_ref.features.templates import cut
+from vslam_ref.geometry import se3
+from vslam_ref.geometry.cameras import Pinhole
+from vslam_ref.systems.ptam.mapper.curve_search import Gates, with_bearings
 
 from .rows_features import image, read_only
 
@@ -38,6 +41,30 @@ def for_locate_by_corners(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return _for_locate(rng, n, 9000.0 * (n % 2), B % 2 == 0, False)
 
 
+CAMERA = Pinhole(90.0, 80.0, 40.0, 30.0)
+T_B_A = se3.exp([-0.3, 0.05, 0.1, 0.05, -0.1, 0.08])
+
+
+def for_pinhole_rays(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """One pixel has no ray."""
+    uv = rng.uniform(-20, 100, (8 * n, 2))
+    uv[0] = [1e9, 3.0]
+    return CAMERA.params, uv
+
+
+def for_search_curve(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Corners of one picture, looked for in itself as if the camera had moved: some fit, some never."""
+    drawn = read_only(image(rng, n))
+    xy = detect(drawn, 15).xy
+    a = with_bearings(CAMERA, xy[rng.permutation(len(xy))[: 20 * n]], 0)
+    a.valid[:1] = False
+    patch = read_only(cut(drawn, a.xy).patch.reshape(-1, 64))
+    gates = Gates(B % 3, 0.2, 2.0, 1.5 if B % 2 else 0.5)
+    return patch, a, drawn, with_bearings(CAMERA, xy, 0), T_B_A, gates
+
+
 ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
+    "curves:pinhole_rays": [for_pinhole_rays],
+    "curves:search_curve": [for_search_curve],
     "looking:locate": [for_locate, for_locate_by_corners],
 }

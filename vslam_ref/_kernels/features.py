@@ -109,25 +109,79 @@ def _where(corner, columns):
     return found[:n].copy()
 
 
+@njit(cache=True)
+def _brightest_arc(p, arc, two, four, eight):
+    """Largest minimum of ``arc`` of 16 values in a row; p has them twice, so that arcs run on."""
+    for k in range(31):
+        two[k] = min(p[k], p[k + 1])
+    for k in range(29):
+        four[k] = min(two[k], two[k + 2])
+    for k in range(25):
+        eight[k] = min(four[k], four[k + 4])
+    best = np.uint8(0)
+    for k in range(16):
+        best = max(best, min(eight[k], eight[k + arc - 8]))
+    return np.int64(best)
+
+
 @kernel(BYTES, types.int64, PIXELS, types.int64, returns=NEW_INTEGERS)
 def corner_score(flat, width, xy, arc):
     """Twin of :func:`vslam_ref.features.fast._corner_score`."""
     offsets = CIRCLE_X + CIRCLE_Y * width
     score = np.empty(xy.shape[0], np.int64)
-    brighter = np.empty(32, np.int64)
+    bright, dark = np.empty(32, np.uint8), np.empty(32, np.uint8)
+    two, four, eight = np.empty(32, np.uint8), np.empty(32, np.uint8), np.empty(32, np.uint8)
     for n in range(xy.shape[0]):
         at = np.int64(xy[n, 1]) * width + xy[n, 0]
         for k in range(16):
-            brighter[k] = np.int64(flat[at + offsets[k]]) - np.int64(flat[at])
-            brighter[k + 16] = brighter[k]
-        best = 0
-        for k in range(16):
-            least, most = brighter[k], brighter[k]
-            for j in range(1, arc):
-                least, most = min(least, brighter[k + j]), max(most, brighter[k + j])
-            best = max(best, least, -most)
-        score[n] = best - 1
+            level = flat[at + offsets[k]]
+            bright[k] = bright[k + 16] = level
+            dark[k] = dark[k + 16] = np.uint8(255 - level)
+        centre = np.int64(flat[at])
+        brighter = _brightest_arc(bright, arc, two, four, eight) - centre
+        darker = _brightest_arc(dark, arc, two, four, eight) - (255 - centre)
+        score[n] = max(brighter, darker, 0) - 1
     return score
+
+
+@njit(cache=True)
+def _higher_in_row(xy, score, low, end, x, value):
+    """Whether a corner at x - 1, x or x + 1 has the value or a higher one; the first from x - 1 on."""
+    while low < end and xy[low, 0] < x - 1:
+        low += 1
+    higher, k = False, low
+    while k < end and xy[k, 0] <= x + 1:
+        higher = higher or score[k] >= value
+        k += 1
+    return higher, low
+
+
+@kernel(
+    PIXELS,
+    types.Array(types.int64, 1, "A", readonly=True),
+    types.int64,
+    types.Array(types.int64, 1, "A", readonly=True),
+    returns=types.Array(types.bool_, 1, "C"),
+)
+def is_peak(xy, row_start, width, score):
+    """Twin of :func:`vslam_ref.features.corners._is_peak`."""
+    peak = np.ones(xy.shape[0], np.bool_)
+    rows = row_start.shape[0] - 1
+    for y in range(rows):
+        above, below = row_start[max(y - 1, 0)], row_start[y + 1]
+        for c in range(row_start[y], row_start[y + 1]):
+            x, value = xy[c, 0], score[c]
+            if c > row_start[y] and xy[c - 1, 0] == x - 1 and score[c - 1] >= value:
+                peak[c] = False
+            if c + 1 < row_start[y + 1] and xy[c + 1, 0] == x + 1 and score[c + 1] >= value:
+                peak[c] = False
+            if y > 0:
+                higher, above = _higher_in_row(xy, score, above, row_start[y], x, value)
+                peak[c] = peak[c] and not higher
+            if y + 1 < rows:
+                higher, below = _higher_in_row(xy, score, below, row_start[y + 2], x, value)
+                peak[c] = peak[c] and not higher
+    return peak
 
 
 @kernel(BYTES, types.int64, PIXELS, returns=NUMBERS)
