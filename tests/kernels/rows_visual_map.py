@@ -12,6 +12,7 @@ from vslam_ref.features.templates import cut
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.systems.ptam.mapper.curve_search import Gates, with_bearings
+from vslam_ref.systems.visual_map.visibility import _Known
 
 from .rows_features import image, read_only
 
@@ -63,8 +64,37 @@ def for_search_curve(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return patch, a, drawn, with_bearings(CAMERA, xy, 0), T_B_A, gates
 
 
+def known(rng: Rng, n: int) -> _Known:
+    """Points before three keyframes, with slopes of a pinhole."""
+    count = 20 * n
+    T_kf_world, level = se3.exp(rng.normal(0, 0.1, (3, 6))), rng.integers(0, 4, count)
+    X, uv = rng.uniform([-2, -2, 1], [2, 2, 8], (count, 3)), rng.uniform(0, 60, (count, 2))
+    slope = np.array([[1 / 90, 0], [0, 1 / 80]]) + rng.normal(0, 1e-3, (count, 2, 2))
+    return _Known(T_kf_world, X, rng.integers(0, 3, count), level, uv, slope)
+
+
+def for_pinhole_visible(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Nearly all points, in any order, from a place near the keyframes."""
+    there = known(rng, n)
+    number = rng.permutation(len(there.X_world))[1:]
+    return there, se3.exp(rng.normal(0, 0.1, 6)), number, CAMERA.params, 60, 80, 4
+
+
+def for_read_templates(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Three pictures one under another; some patches leave theirs."""
+    there, each = known(rng, n), B % 2
+    images = np.concatenate([image(rng, n)[:40] for _ in range(3)])
+    count = len(there.slope)
+    A, level = np.eye(2) + rng.normal(0, 0.2, (count, 2, 2)), rng.integers(0, 2, count)
+    filled = np.zeros((count, 64), np.uint8), np.zeros(count, np.bool_)
+    at = there.source_kf, there.source_level, there.source_uv
+    return read_only(images.reshape(-1)), images.shape[1], 40, each, *at, A, level, *filled
+
+
 ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "curves:pinhole_rays": [for_pinhole_rays],
     "curves:search_curve": [for_search_curve],
+    "visibility:pinhole_visible": [for_pinhole_visible],
+    "visibility:read_templates": [for_read_templates],
     "looking:locate": [for_locate, for_locate_by_corners],
 }

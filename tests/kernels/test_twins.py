@@ -63,7 +63,7 @@ def room_for(a: np.ndarray) -> np.ndarray:
     """The same numbers as a view into a larger array, as a filter with spare capacity holds them."""
     big = np.full(
         tuple(n + 3 * (i > 0) for i, n in enumerate(a.shape)),
-        np.nan if a.dtype.kind in "fc" else -1,
+        np.nan if a.dtype.kind in "fc" else 99 if a.dtype.kind == "u" else -1,
         dtype=a.dtype,
     )
     view = big[tuple(slice(0, n) for n in a.shape)]

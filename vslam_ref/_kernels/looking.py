@@ -34,7 +34,7 @@ def _alike(flat, width, height, x, y, patch, a, aa, most, here):
     if not (x >= BEFORE and x + AFTER <= width - 1 and y >= BEFORE and y + AFTER <= height - 1):
         return False
     _read(flat, width, height, x, y, -BEFORE, SIDE, here)
-    b = bb = cross = 0
+    b = bb = cross = np.int64(0)
     for k in range(AREA):
         level = np.int64(np.floor(here[k] + 0.5))
         b, bb, cross = b + level, bb + level * level, cross + level * np.int64(patch[k])
