@@ -292,7 +292,7 @@ def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, 
         a, b = copies(arguments), nudged(copies(arguments))
         r, s = outputs(twin, function(*a)), outputs(twin, function(*b))
     pairs = [
-        (np.nan_to_num(u.astype(float)), np.nan_to_num(v.astype(float)))
+        (np.nan_to_num(1.0 * u), np.nan_to_num(1.0 * v))
         for u, v in zip([*fields(a), *r], [*fields(b), *s], strict=True)
         if isinstance(u, np.ndarray)
         and (u.dtype.kind in "fc" or (u.dtype.kind in "bu" and u.flags.writeable))

@@ -50,6 +50,7 @@ class OnCurve(NamedTuple):
 
 def with_bearings(camera: Camera, xy: Pixels, level: int) -> CornerRays:
     """Give corners of a level their rays."""
+    xy = np.ascontiguousarray(xy, np.int32)
     uv = finest_from_level(xy, level)
     if isinstance(camera, Pinhole):
         return CornerRays(xy, *_pinhole_rays(camera.params, uv))
