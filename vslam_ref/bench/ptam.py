@@ -11,8 +11,8 @@ FE-4  the pose from 1000 points, ten steps of Tukey's loss, over one refinement 
 
 The system is called as users call it, :meth:`~vslam_ref.systems.ptam.Ptam.step`, with its own settings.  The
 first 300 pictures of ``7scenes_redkitchen`` count from the first that is tracked; where that set is not
-found, a rendered desk takes its place, and the rows say so.  *Tracked* is the median over pictures of their own
-ratio, without the stages of the mapper.  *With mapping* divides the sum over all pictures by that of
+found, a rendered desk takes its place, and the rows say so.  *Tracked* is the median over pictures of their
+own ratio, without the stages of the mapper.  *With mapping* divides the sum over all pictures by that of
 ``cv2.FAST``: a tenth of the pictures are keyframes, which a median would not see.  Not all pictures show the
 1000 points that may be tried: the rows tell the median number.
 """
@@ -130,7 +130,7 @@ def timed(given: Film) -> Times:
         rows.append([tracking, mapping, fast, len(outcome.tracked.fine.seen.point)])
         keyframes += outcome.mapped is not None
     columns = np.array(rows, np.float64).reshape(-1, 4).T
-    return Times(*columns, keyframes)
+    return Times(columns[0], columns[1], columns[2], columns[3], keyframes)
 
 
 class Sighted(NamedTuple):
