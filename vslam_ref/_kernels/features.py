@@ -15,6 +15,7 @@ CIRCLE_X = np.array([0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1])
 CIRCLE_Y = np.array([3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1, 0, 1, 2, 3])
 BORDER, HALF = 3, 3
 TILE, PITCH = 128, 144  # columns that are asked together; bytes from row to row of a strip
+LANES = 64  # corners that are scored together
 C = BORDER * PITCH + BORDER
 P = tuple(int(C + y * PITCH + x) for x, y in zip(CIRCLE_X, CIRCLE_Y, strict=True))
 
@@ -110,37 +111,49 @@ def _where(corner, columns):
 
 
 @njit(cache=True)
-def _brightest_arc(p, arc, two, four, eight):
-    """Largest minimum of ``arc`` of 16 values in a row; p has them twice, so that arcs run on."""
-    for k in range(31):
-        two[k] = min(p[k], p[k + 1])
-    for k in range(29):
-        four[k] = min(two[k], two[k + 2])
-    for k in range(25):
-        eight[k] = min(four[k], four[k + 4])
-    best = np.uint8(0)
+def _least_of_two(rows, step, count, out):
+    """Row k of ``out`` is the smaller of rows k and k + step, number by number."""
+    low, high, into = rows[: count * LANES], rows[step * LANES : (step + count) * LANES], out[: count * LANES]
+    for x in range(count * LANES):
+        into[x] = min(low[x], high[x])
+
+
+@njit(cache=True)
+def _brightest_arc(circle, arc, two, four, best):
+    """Largest minimum of ``arc`` of 16 rows one after the other; the circle has them twice: arcs run on."""
+    _least_of_two(circle, 1, 31, two)
+    _least_of_two(two, 2, 29, four)
+    _least_of_two(four, 4, 25, two)
+    _least_of_two(two, arc - 8, 16, four)
+    best[:] = 0
     for k in range(16):
-        best = max(best, min(eight[k], eight[k + arc - 8]))
-    return np.int64(best)
+        row = four[k * LANES : (k + 1) * LANES]
+        for x in range(LANES):
+            best[x] = max(best[x], row[x])
 
 
 @kernel(BYTES, types.int64, PIXELS, types.int64, returns=NEW_INTEGERS)
 def corner_score(flat, width, xy, arc):
-    """Twin of :func:`vslam_ref.features.fast._corner_score`."""
-    offsets = CIRCLE_X + CIRCLE_Y * width
+    """Twin of :func:`vslam_ref.features.fast._corner_score`: many corners at a time, a row for each of 16."""
+    offsets, size = CIRCLE_X + CIRCLE_Y * width, 32 * LANES
     score = np.empty(xy.shape[0], np.int64)
-    bright, dark = np.empty(32, np.uint8), np.empty(32, np.uint8)
-    two, four, eight = np.empty(32, np.uint8), np.empty(32, np.uint8), np.empty(32, np.uint8)
-    for n in range(xy.shape[0]):
-        at = np.int64(xy[n, 1]) * width + xy[n, 0]
-        for k in range(16):
-            level = flat[at + offsets[k]]
-            bright[k] = bright[k + 16] = level
-            dark[k] = dark[k + 16] = np.uint8(255 - level)
-        centre = np.int64(flat[at])
-        brighter = _brightest_arc(bright, arc, two, four, eight) - centre
-        darker = _brightest_arc(dark, arc, two, four, eight) - (255 - centre)
-        score[n] = max(brighter, darker, 0) - 1
+    bright, dark = np.zeros(size, np.uint8), np.empty(size, np.uint8)
+    two, four = np.empty(size, np.uint8), np.empty(size, np.uint8)
+    most, least = np.empty(LANES, np.uint8), np.empty(LANES, np.uint8)
+    for first in range(0, xy.shape[0], LANES):
+        count = min(LANES, xy.shape[0] - first)
+        for x in range(count):
+            at = np.int64(xy[first + x, 1]) * width + xy[first + x, 0]
+            for k in range(16):
+                bright[k * LANES + x] = flat[at + offsets[k]]
+        bright[16 * LANES :] = bright[: 16 * LANES]
+        for x in range(size):
+            dark[x] = np.uint8(255 - bright[x])
+        _brightest_arc(bright, arc, two, four, most)
+        _brightest_arc(dark, arc, two, four, least)
+        for x in range(count):
+            centre = np.int64(flat[np.int64(xy[first + x, 1]) * width + xy[first + x, 0]])
+            score[first + x] = max(np.int64(most[x]) - centre, np.int64(least[x]) + centre - 255, 0) - 1
     return score
 
 
