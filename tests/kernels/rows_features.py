@@ -48,6 +48,12 @@ def for_corner_score(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return pixels, width, inner(rng, width, n), 9 + B % 4
 
 
+def for_is_peak(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Corners side by side, of few different scores, so that some neighbours are equal."""
+    found = detect(image(rng, n), 8)
+    return read_only(found.xy), found.row_start, found.width, rng.integers(0, 4 + B, len(found.xy))
+
+
 def for_shi_tomasi(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     pixels, width = flat(rng, n)
     return pixels, width, inner(rng, width, n)
@@ -97,6 +103,7 @@ ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "features:halve": [for_halve],
     "features:segment_test": [for_segment_test],
     "features:corner_score": [for_corner_score],
+    "features:is_peak": [for_is_peak],
     "features:shi_tomasi": [for_shi_tomasi],
     "patches:warp": [for_warp],
     "patches:search": [for_zmssd, for_zncc],

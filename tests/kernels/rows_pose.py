@@ -1,4 +1,4 @@
-"""Inputs for the twin of pose tracking: points before a pinhole, some matched wrongly, one behind it."""
+"""Inputs for the twins of poses and points: pinholes, some matches wrong, one point behind the camera."""
 
 from __future__ import annotations
 
@@ -33,6 +33,19 @@ def for_too_few(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return K, T, X[1:4], uv[1:4], root[1:4], c, steps, least
 
 
+def for_points(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Points seen by two to four pinholes, some not by all; starts off by a tenth of the depth."""
+    count, V = 2 * n, 2 + B % 3
+    K = CAMERA.params + rng.normal(0, 5, (V, 4))
+    T = se3.exp(rng.normal(0, 0.1, (V, 6)) - np.arange(V)[:, None] * [0.5, 0, 0, 0, 0, 0])
+    X = rng.uniform([-2, -2, 3], [2, 2, 8], (count, 3))
+    uv = np.stack([Pinhole(*k).pixel_from_world(t, X).uv for k, t in zip(K, T, strict=True)], 1)
+    root = rng.choice([1.0, 0.5], (count, V))
+    root[0, 2:] = 0.0
+    return K, T, uv + rng.normal(0, 0.5, uv.shape), root, X * rng.uniform(0.9, 1.1, (count, 1)), 20
+
+
 ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
-    "pose:pinhole_steps": [for_steps, for_too_few]
+    "points:pinhole_descent": [for_points],
+    "pose:pinhole_steps": [for_steps, for_too_few],
 }

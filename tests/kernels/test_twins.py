@@ -27,7 +27,7 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.grids.static_dynamic import Layers, Rules
 
-from . import rows_bundle, rows_features, rows_pose, rows_rendered
+from . import rows_bundle, rows_features, rows_pose, rows_rendered, rows_visual_map
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 
@@ -63,7 +63,7 @@ def room_for(a: np.ndarray) -> np.ndarray:
     """The same numbers as a view into a larger array, as a filter with spare capacity holds them."""
     big = np.full(
         tuple(n + 3 * (i > 0) for i, n in enumerate(a.shape)),
-        np.nan if a.dtype.kind in "fc" else -1,
+        np.nan if a.dtype.kind in "fc" else 99 if a.dtype.kind == "u" else -1,
         dtype=a.dtype,
     )
     view = big[tuple(slice(0, n) for n in a.shape)]
@@ -174,6 +174,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     **rows_features.ROWS,
     **rows_pose.ROWS,
     **rows_rendered.ROWS,
+    **rows_visual_map.ROWS,
 }
 
 
@@ -291,9 +292,10 @@ def test_comparison_sees_a_millionth(twin: str, build: Callable[..., tuple[Any, 
         a, b = copies(arguments), nudged(copies(arguments))
         r, s = outputs(twin, function(*a)), outputs(twin, function(*b))
     pairs = [
-        (np.nan_to_num(u), np.nan_to_num(v))
+        (np.nan_to_num(1.0 * u), np.nan_to_num(1.0 * v))
         for u, v in zip([*fields(a), *r], [*fields(b), *s], strict=True)
-        if isinstance(u, np.ndarray) and u.dtype.kind in "fc"
+        if isinstance(u, np.ndarray)
+        and (u.dtype.kind in "fc" or (u.dtype.kind in "bu" and u.flags.writeable))
     ]
     far = [np.inf if u.shape != v.shape else np.abs(u - v).max(initial=0.0) for u, v in pairs]
     assert max(far) > TOLERANCE * 100

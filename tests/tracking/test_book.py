@@ -34,11 +34,19 @@ def points(desk: Any) -> list[book.Point]:
     ]
 
 
+def on_the_margin(desk: Any, u: np.ndarray, level: int) -> bool:
+    """Whether rounding decides that a pixel is in: corners seen from their own keyframe are whole pixels."""
+    at, size = book.on_level(u, level), np.array(desk.map.shape[::-1]) / 2**level
+    return bool(min(np.abs(at - 5).min(), np.abs(size - 6 - at).min()) < 1e-9)
+
+
 @pytest.mark.parametrize("k", [0, 9])
 def test_visible_points_warps_and_levels(desk: Any, points: list[book.Point], k: int) -> None:
     """Products of three matrices with entries below 200: 1e-10 is some hundred roundings."""
     fast = visible(desk.map, desk.pose(k))
     slow = book.visible(desk.map.camera, points, desk.pose(k), desk.pictures[k])
+    fast = fast.only([not on_the_margin(desk, u, n) for u, n in zip(fast.uv, fast.level, strict=True)])
+    slow = [s for s in slow if not on_the_margin(desk, s.u, s.level)]
     assert len(slow) == len(fast.point) > 150
     for row, s in enumerate(slow):
         assert s.point is points[fast.point[row]]

@@ -9,7 +9,7 @@ import pytest
 from scipy import integrate, optimize, stats
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.pose_tracking import TrackedPose, track_pose
+from vslam_ref.estimation.pose_tracking import TrackedPose, _pinhole_weighed, _weighed, track_pose
 from vslam_ref.estimation.robust import L2, covariance_factor, efficiency, tuned
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole
@@ -99,6 +99,21 @@ def test_scale_and_weights_are_those_of_norms_in_the_plane() -> None:
     expected = np.where(x < 5.1230 * sigma, (1 - (x / (5.1230 * sigma)) ** 2) ** 2, 0)
     np.testing.assert_allclose(found.weights, expected, atol=1e-4)  # of the five digits
     assert not found.inliers[:12].any()
+
+
+@pytest.mark.parametrize("n", [3, 60])
+def test_the_form_for_a_pinhole_is_the_one_for_any_lens(n: int) -> None:
+    """Sums of n products, of size 1e6 at most, in another order: n eps of the largest entry, times ten."""
+    w = scene(3, n, noise=0.7)
+    X = w.X.copy()
+    X[0] = se3.act(se3.inverse(w.T), [0.1, 0.2, -3.0])  # behind the camera
+    T, loss = se3.perturb(w.T, np.full(6, 0.01)), tuned("tukey", 2)
+    a = _weighed(w.camera, X, w.uv, 1.0 / w.s, T, loss, 0.4)
+    b = _pinhole_weighed(w.camera.params, X, w.uv, 1.0 / w.s, T, loss.c, 0.4)
+    assert a.trouble == b.trouble
+    for p, q in zip(a[:4], b[:4], strict=True):
+        limit = 10 * n * np.finfo(float).eps * np.abs(p).max()
+        np.testing.assert_allclose(p, q, rtol=0, atol=limit)
 
 
 def test_wrong_matches_do_not_count_and_squares_fall_for_them() -> None:

@@ -50,15 +50,16 @@ def njit(*, cache, error_model="python"):
     """Compile at the first call, as ``numba.njit`` does, and keep the code in :func:`cache_folder`.
 
     With ``error_model="numpy"`` a division by zero is not looked for, which costs a branch each time.
+    Other threads go on while a kernel runs: it touches arrays only, no object of Python.
     """
 
     def declare(function):
         folder, before = cache_folder(), CONFIG.CACHE_DIR
         if folder is None:
-            return numba.njit(error_model=error_model)(function)
+            return numba.njit(error_model=error_model, nogil=True)(function)
         try:
             CONFIG.CACHE_DIR = folder  # read when the function is declared
-            return numba.njit(cache=cache, error_model=error_model)(function)
+            return numba.njit(cache=cache, error_model=error_model, nogil=True)(function)
         finally:
             CONFIG.CACHE_DIR = before
 

@@ -15,6 +15,7 @@ CIRCLE_X = np.array([0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1])
 CIRCLE_Y = np.array([3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1, 0, 1, 2, 3])
 BORDER, HALF = 3, 3
 TILE, PITCH = 128, 144  # columns that are asked together; bytes from row to row of a strip
+LANES = 64  # corners that are scored together
 C = BORDER * PITCH + BORDER
 P = tuple(int(C + y * PITCH + x) for x, y in zip(CIRCLE_X, CIRCLE_Y, strict=True))
 
@@ -109,25 +110,91 @@ def _where(corner, columns):
     return found[:n].copy()
 
 
+@njit(cache=True)
+def _least_of_two(rows, step, count, out):
+    """Row k of ``out`` is the smaller of rows k and k + step, number by number."""
+    low, high, into = rows[: count * LANES], rows[step * LANES : (step + count) * LANES], out[: count * LANES]
+    for x in range(count * LANES):
+        into[x] = min(low[x], high[x])
+
+
+@njit(cache=True)
+def _brightest_arc(circle, arc, two, four, best):
+    """Largest minimum of ``arc`` of 16 rows one after the other; the circle has them twice: arcs run on."""
+    _least_of_two(circle, 1, 31, two)
+    _least_of_two(two, 2, 29, four)
+    _least_of_two(four, 4, 25, two)
+    _least_of_two(two, arc - 8, 16, four)
+    best[:] = 0
+    for k in range(16):
+        row = four[k * LANES : (k + 1) * LANES]
+        for x in range(LANES):
+            best[x] = max(best[x], row[x])
+
+
 @kernel(BYTES, types.int64, PIXELS, types.int64, returns=NEW_INTEGERS)
 def corner_score(flat, width, xy, arc):
-    """Twin of :func:`vslam_ref.features.fast._corner_score`."""
-    offsets = CIRCLE_X + CIRCLE_Y * width
+    """Twin of :func:`vslam_ref.features.fast._corner_score`: many corners at a time, a row for each of 16."""
+    offsets, size = CIRCLE_X + CIRCLE_Y * width, 32 * LANES
     score = np.empty(xy.shape[0], np.int64)
-    brighter = np.empty(32, np.int64)
-    for n in range(xy.shape[0]):
-        at = np.int64(xy[n, 1]) * width + xy[n, 0]
-        for k in range(16):
-            brighter[k] = np.int64(flat[at + offsets[k]]) - np.int64(flat[at])
-            brighter[k + 16] = brighter[k]
-        best = 0
-        for k in range(16):
-            least, most = brighter[k], brighter[k]
-            for j in range(1, arc):
-                least, most = min(least, brighter[k + j]), max(most, brighter[k + j])
-            best = max(best, least, -most)
-        score[n] = best - 1
+    bright, dark = np.zeros(size, np.uint8), np.empty(size, np.uint8)
+    two, four = np.empty(size, np.uint8), np.empty(size, np.uint8)
+    most, least = np.empty(LANES, np.uint8), np.empty(LANES, np.uint8)
+    for first in range(0, xy.shape[0], LANES):
+        count = min(LANES, xy.shape[0] - first)
+        for x in range(count):
+            at = np.int64(xy[first + x, 1]) * width + xy[first + x, 0]
+            for k in range(16):
+                bright[k * LANES + x] = flat[at + offsets[k]]
+        bright[16 * LANES :] = bright[: 16 * LANES]
+        for x in range(size):
+            dark[x] = np.uint8(255 - bright[x])
+        _brightest_arc(bright, arc, two, four, most)
+        _brightest_arc(dark, arc, two, four, least)
+        for x in range(count):
+            centre = np.int64(flat[np.int64(xy[first + x, 1]) * width + xy[first + x, 0]])
+            score[first + x] = max(np.int64(most[x]) - centre, np.int64(least[x]) + centre - 255, 0) - 1
     return score
+
+
+@njit(cache=True)
+def _higher_in_row(xy, score, low, end, x, value):
+    """Whether a corner at x - 1, x or x + 1 has the value or a higher one; the first from x - 1 on."""
+    while low < end and xy[low, 0] < x - 1:
+        low += 1
+    higher, k = False, low
+    while k < end and xy[k, 0] <= x + 1:
+        higher = higher or score[k] >= value
+        k += 1
+    return higher, low
+
+
+@kernel(
+    PIXELS,
+    types.Array(types.int64, 1, "A", readonly=True),
+    types.int64,
+    types.Array(types.int64, 1, "A", readonly=True),
+    returns=types.Array(types.bool_, 1, "C"),
+)
+def is_peak(xy, row_start, width, score):
+    """Twin of :func:`vslam_ref.features.corners._is_peak`."""
+    peak = np.ones(xy.shape[0], np.bool_)
+    rows = row_start.shape[0] - 1
+    for y in range(rows):
+        above, below = row_start[max(y - 1, 0)], row_start[y + 1]
+        for c in range(row_start[y], row_start[y + 1]):
+            x, value = xy[c, 0], score[c]
+            if c > row_start[y] and xy[c - 1, 0] == x - 1 and score[c - 1] >= value:
+                peak[c] = False
+            if c + 1 < row_start[y + 1] and xy[c + 1, 0] == x + 1 and score[c + 1] >= value:
+                peak[c] = False
+            if y > 0:
+                higher, above = _higher_in_row(xy, score, above, row_start[y], x, value)
+                peak[c] = peak[c] and not higher
+            if y + 1 < rows:
+                higher, below = _higher_in_row(xy, score, below, row_start[y + 2], x, value)
+                peak[c] = peak[c] and not higher
+    return peak
 
 
 @kernel(BYTES, types.int64, PIXELS, returns=NUMBERS)

@@ -11,6 +11,7 @@ from vslam_ref._kernels.features import BYTES, NEW_INTEGERS, NUMBERS, PIXELS
 BEFORE, AFTER, SIDE, AREA = 4, 3, 8, 64
 INNER, LEAST_SLOPE, FARTHEST, STEPS, NEAR = 6, 1.0 / 24.0, 4.0, 10, 0.01
 OK, FLAT, OUTSIDE, ASTRAY, SLOW = 0, 1, 2, 3, 4
+ROOM = AREA + 2 * SIDE  # grey levels of a patch, and how far its columns and rows lie between pixels
 
 PATCHES = types.Array(types.uint8, 2, "C", readonly=True)
 NEW_PATCHES = types.Array(types.uint8, 2, "C")
@@ -167,7 +168,7 @@ def _slopes(template, T, gx, gy):
         T[k] = template[at]
         gx[k] = (np.float64(template[at + 1]) - np.float64(template[at - 1])) / 2
         gy[k] = (np.float64(template[at + SIDE]) - np.float64(template[at - SIDE])) / 2
-    mx, my = gx.mean(), gy.mean()
+    mx, my = gx[: INNER * INNER].mean(), gy[: INNER * INNER].mean()
     a = b = c = 0.0
     for k in range(INNER * INNER):
         gx[k], gy[k] = gx[k] - mx, gy[k] - my
@@ -176,16 +177,57 @@ def _slopes(template, T, gx, gy):
 
 
 @njit(cache=True)
-def _one_step(flat, width, height, u, v, T, gx, gy):
-    """(inside, offset, sum of gx r, sum of gy r) at a place."""
+def _read(flat, width, height, u, v, low, n, out):
+    """Grey levels at n x n places from (u + low, v + low) on, one pixel apart, all inside.
+
+    What is interpolated along a row serves the places above and below it.
+    """
+    i0, j0, in_steps = int(v + low), int(u + low), True
+    for k in range(n):
+        x, y = u + (k + low), v + (k + low)
+        i, j = min(int(y), height - 2), min(int(x), width - 2)
+        in_steps = in_steps and i == i0 + k and j == j0 + k
+        out[AREA + k], out[AREA + n + k] = x - j, y - i
+    if not in_steps:  # at the far border, or where rounding reaches the next pixel
+        for k in range(n * n):
+            out[k] = _bilinear(flat, width, height, u + (k % n + low), v + (k // n + low))
+        return
+    for r in range(n + 1):
+        first = np.uint64((i0 + r) * width + j0)  # unsigned: never counted from the end
+        for k in range(n):
+            a, b = np.float64(flat[first + np.uint64(k)]), np.float64(flat[first + np.uint64(k + 1)])
+            below = a + out[AREA + k] * (b - a)
+            if r > 0:
+                at = (r - 1) * n + k
+                out[at] += out[AREA + n + r - 1] * (below - out[at])
+            if r < n:
+                out[r * n + k] = below
+
+
+@njit(cache=True)
+def _refined(flat, width, height, u, v, T, gx, gy, S, here):
+    """Place, offset and state of a template with slopes ``gx``, ``gy`` and S = (a, b, c), from (u, v) on."""
+    (a, b, c), x, y, offset = S, u, v, 0.0
+    if (a + c - np.sqrt((a - c) ** 2 + 4 * b * b)) / 2 <= LEAST_SLOPE * INNER * INNER:
+        return x, y, offset, FLAT
+    det = a * c - b * b
     low, high = 1 - BEFORE, INNER - BEFORE
-    if not (u + low >= 0 and u + high <= width - 1 and v + low >= 0 and v + high <= height - 1):
-        return False, 0.0, 0.0, 0.0
-    total = p = q = 0.0
-    for k in range(INNER * INNER):
-        r = T[k] - _bilinear(flat, width, height, u + (k % INNER + low), v + (k // INNER + low))
-        total, p, q = total + r, p + gx[k] * r, q + gy[k] * r
-    return True, -total / (INNER * INNER), p, q
+    for _ in range(STEPS):
+        if not (x + low >= 0 and x + high <= width - 1 and y + low >= 0 and y + high <= height - 1):
+            return x, y, offset, OUTSIDE
+        _read(flat, width, height, x, y, low, INNER, here)
+        total = p = q = 0.0
+        for k in range(INNER * INNER):
+            r = T[k] - here[k]
+            total, p, q = total + r, p + gx[k] * r, q + gy[k] * r
+        offset = -total / (INNER * INNER)
+        du, dv = (c * p - b * q) / det, (a * q - b * p) / det
+        x, y = x + du, y + dv
+        if np.hypot(x - u, y - v) > FARTHEST:
+            return x, y, offset, ASTRAY
+        if np.hypot(du, dv) < NEAR:
+            return x, y, offset, OK
+    return x, y, offset, SLOW
 
 
 @kernel(
@@ -198,27 +240,11 @@ def _one_step(flat, width, height, u, v, T, gx, gy):
 def refine(flat, width, patch, uv):
     """Twin of :func:`vslam_ref.features.refinement._refine`."""
     height = flat.shape[0] // width
-    place, offset, state = uv.copy(), np.zeros(uv.shape[0]), np.full(uv.shape[0], SLOW, np.int8)
-    T, gx, gy = np.empty(INNER * INNER), np.empty(INNER * INNER), np.empty(INNER * INNER)
+    place, offset, state = uv.copy(), np.zeros(uv.shape[0]), np.empty(uv.shape[0], np.int8)
+    T, gx, gy, here = np.empty(AREA), np.empty(AREA), np.empty(AREA), np.empty(ROOM)
     for n in range(uv.shape[0]):
-        a, b, c = _slopes(patch[n], T, gx, gy)
-        if (a + c - np.sqrt((a - c) ** 2 + 4 * b * b)) / 2 <= LEAST_SLOPE * INNER * INNER:
-            state[n] = FLAT
-            continue
-        det = a * c - b * b
-        for _ in range(STEPS):
-            inside, shift, p, q = _one_step(flat, width, height, place[n, 0], place[n, 1], T, gx, gy)
-            if not inside:
-                state[n] = OUTSIDE
-                break
-            offset[n] = shift
-            du, dv = (c * p - b * q) / det, (a * q - b * p) / det
-            place[n, 0] += du
-            place[n, 1] += dv
-            if np.hypot(place[n, 0] - uv[n, 0], place[n, 1] - uv[n, 1]) > FARTHEST:
-                state[n] = ASTRAY
-                break
-            if np.hypot(du, dv) < NEAR:
-                state[n] = OK
-                break
+        S = _slopes(patch[n], T, gx, gy)
+        place[n, 0], place[n, 1], offset[n], state[n] = _refined(
+            flat, width, height, uv[n, 0], uv[n, 1], T, gx, gy, S, here
+        )
     return place, offset, state

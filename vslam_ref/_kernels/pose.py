@@ -84,7 +84,8 @@ def _trouble(H, held):
             return UNDETERMINED
         for j in range(6):
             scaled[i, j] = H[i, j] / np.sqrt(H[i, i]) / np.sqrt(H[j, j])
-    return UNDETERMINED if np.linalg.cond(scaled) > WORST else FINE
+    values = np.linalg.eigvalsh(scaled)
+    return FINE if values[5] <= WORST * values[0] else UNDETERMINED
 
 
 @njit(cache=True)

@@ -71,19 +71,17 @@ def nearest_of(xn, column, row, homography, extent, box):
 
 
 @njit(cache=True, error_model="numpy")
-def _bilinear(texels, table, t, level, a, b):
-    """Level of texture t at column a and row b of its finest level, texels."""
-    begin, height, width = table[t, level, 0], table[t, level, 1], table[t, level, 2]
-    scale = 1.0 / np.float64(1 << level)
-    u = min(max(a * scale - 0.5, 0.0), width - 1.0)
-    v = min(max(b * scale - 0.5, 0.0), height - 1.0)
+def _bilinear(texels, begin, height, width, u, v):
+    """Grey value at column u and row v, texels, of a level that begins there; the nearest one outside."""
+    u = min(max(u, 0.0), width - 1.0)
+    v = min(max(v, 0.0), height - 1.0)
     left, top = np.int64(u), np.int64(v)
     u, v = u - left, v - top
-    row = begin + top * width + left
-    right = 1 if left + 1 < width else 0
-    down = width if top + 1 < height else 0
-    p, q = np.float64(texels[np.uint64(row)]), np.float64(texels[np.uint64(row + right)])
-    r, s = np.float64(texels[np.uint64(row + down)]), np.float64(texels[np.uint64(row + down + right)])
+    row = np.uint64(begin + top * width + left)  # unsigned: never counted from the end
+    right = np.uint64(left + 1 < width)
+    down = np.uint64(width if top + 1 < height else 0)
+    p, q = np.float64(texels[row]), np.float64(texels[row + right])
+    r, s = np.float64(texels[row + down]), np.float64(texels[row + down + right])
     upper = p + u * (q - p)
     return upper + v * (r + u * (s - r) - upper)
 
@@ -109,18 +107,26 @@ def _footprint(p_u, p_v, q_u, q_v, most):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(texels, table, t, level, a, b):
-    """Grey value of texture t between two levels."""
-    low = np.int64(level)
-    fine = _bilinear(texels, table, t, low, a, b)
-    share = level - low
-    if share > 0.0:
-        fine += share * (_bilinear(texels, table, t, low + 1, a, b) - fine)
-    return fine
+def _sample(texels, table, level, probes, a, b, long_a, long_b):
+    """Grey value of a texture between two levels, summed over probes along the patch's longer side."""
+    low, total = np.int64(level), 0.0
+    share, scale = level - low, 1.0 / np.float64(1 << low)
+    begin, height, width = table[low, 0], table[low, 1], table[low, 2]
+    up = min(low + 1, table.shape[0] - 1)
+    begin_up, height_up, width_up, scale_up = table[up, 0], table[up, 1], table[up, 2], 0.5 * scale
+    for k in range(probes):
+        shift = (k + 0.5) / probes - 0.5
+        x, y = a + shift * long_a, b + shift * long_b
+        fine = _bilinear(texels, begin, height, width, x * scale - 0.5, y * scale - 0.5)
+        if share > 0.0:
+            u, v = x * scale_up - 0.5, y * scale_up - 0.5
+            fine += share * (_bilinear(texels, begin_up, height_up, width_up, u, v) - fine)
+        total += fine
+    return total
 
 
 @kernel(given(2), NUMBERS3, QUADS, NUMBERS3, INTEGERS1, NUMBERS1, BYTES, INTEGERS3,
-        returns=types.Array(types.float64, 1, "C"))  # fmt: skip
+        returns=types.Array(types.float64, 1, "C"), error_model="numpy")  # fmt: skip
 def shade(xn, spread, quad, homography, texture, light, texels, table):
     """Twin of :func:`vslam_ref.worlds.rendered.raster.shade`."""
     grey = np.full(xn.shape[0], BACKGROUND)
@@ -141,9 +147,6 @@ def shade(xn, spread, quad, homography, texture, light, texels, table):
         p_u, p_v = a_x * x_u + a_y * y_u, a_x * x_v + a_y * y_v
         q_u, q_v = b_x * x_u + b_y * y_u, b_x * x_v + b_y * y_v
         level, probes, long_a, long_b = _footprint(p_u, p_v, q_u, q_v, most)
-        total = 0.0
-        for k in range(probes):
-            shift = (k + 0.5) / probes - 0.5
-            total += _sample(texels, table, t, level, a + shift * long_a, b + shift * long_b)
+        total = _sample(texels, table[t], level, probes, a, b, long_a, long_b)
         grey[n] = light[q] * total / probes
     return grey

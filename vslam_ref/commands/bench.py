@@ -17,6 +17,7 @@ SUITES = {
     "bundle": "vslam_ref.bench.bundle",
     "grids": "vslam_ref.bench.grids",
     "features": "vslam_ref.bench.features",
+    "ptam": "vslam_ref.bench.ptam",
 }
 """Name -> module with ``run(quick) -> dict``; its ``rows``, a list of flat dicts, is printed as a table."""
 

@@ -14,6 +14,7 @@ that follows the errors.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +23,10 @@ from numpy.typing import ArrayLike
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, as_array
 from vslam_ref.estimation.robust import L2, Loss, Tukey, covariance_factor, norm_scale, tuned
+from vslam_ref.estimation.robust.scale import MAD_NORM_2D
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Pinhole
+from vslam_ref.geometry.cameras.interface import MAX_TAN, MIN_DEPTH
 from vslam_ref.geometry.cameras.projection import pose_jacobian
 
 STEPS = 10
@@ -124,7 +127,7 @@ def track_pose(
         T, w, H, last = _pinhole_steps(camera.params, T, X, u, root, rho.c, steps, least_sigma)
         found = _Steps(T, w, float(last[0]), H, int(last[1]))
     else:
-        found = _steps(camera, T, X, u, root, rho, steps, least_sigma)
+        found = _steps(lambda T: _weighed(camera, X, u, root, T, rho, least_sigma), T, steps)
     return _result(found, rho)
 
 
@@ -153,21 +156,19 @@ def _pinhole_steps(
     K: Array, T_start: Array, X: Array, u: Array, root: Array, c: float, steps: int, least: float
 ) -> tuple[Array, Array, Array, Array]:
     """Pose, weights, normal matrix, (scale, trouble) with a pinhole K (4,) and Tukey's constant c."""
-    found = _steps(Pinhole.from_params(K), T_start, X, u, root, Tukey(c), steps, least)
+    found = _steps(lambda T: _pinhole_weighed(K, X, u, root, T, c, least), T_start, steps)
     return found.T_cam_world, found.weights, found.H, np.array([found.sigma, found.trouble])
 
 
-def _steps(
-    camera: Camera, T: Array, X: Array, u: Array, root: Array, loss: Loss, steps: int, least_sigma: float
-) -> _Steps:
+def _steps(weighed: Callable[[Array], _Weighed], T: Array, steps: int) -> _Steps:
     """Reweighted steps; the last round only weighs."""
     for _ in range(steps):
-        at = _weighed(camera, X, u, root, T, loss, least_sigma)
+        at = weighed(T)
         if at.trouble != FINE:
             return _Steps(T, at.weights, at.sigma, at.H, at.trouble)
         mu = -np.linalg.solve(at.H, at.g)
         T = se3.perturb(T, mu)
-    at = _weighed(camera, X, u, root, T, loss, least_sigma)
+    at = weighed(T)
     return _Steps(T, at.weights, at.sigma, at.H, at.trouble)
 
 
@@ -206,10 +207,33 @@ def _weighed(
     return _Weighed(H, g, w, sigma, _trouble(H, w))
 
 
+def _pinhole_weighed(
+    K: Array, X: Array, u: Array, root: Array, T: Array, c: float, least_sigma: float
+) -> _Weighed:
+    """:func:`_weighed` with a pinhole K (4,) and Tukey's loss, a coordinate of all points at a time."""
+    x, y, z = T[:3, :3] @ X.T + T[:3, 3:]
+    valid = (z > MIN_DEPTH) & (z < np.inf) & (np.abs(x) < MAX_TAN * z) & (np.abs(y) < MAX_TAN * z)
+    z, root = np.where(valid, z, 1.0), np.where(valid, root, 0.0)
+    a, b = np.where(valid, x, 0.0) / z, np.where(valid, y, 0.0) / z
+    e = np.stack([(K[0] * a + K[2] - u[:, 0]) * root, (K[1] * b + K[3] - u[:, 1]) * root])
+    size = np.hypot(e[0], e[1])
+    sigma = max(MAD_NORM_2D * float(np.median(size[valid])), least_sigma) if valid.any() else np.inf
+    s = np.maximum(1.0 - (size / (c * sigma)) ** 2, 0.0)
+    w = np.where(valid, s * s, 0.0)
+    J, fx, fy = np.zeros((6, 2, len(z))), K[0] * root, K[1] * root
+    J[0, 0], J[2, 0], J[3, 0], J[4, 0], J[5, 0] = fx / z, -fx * a / z, -fx * a * b, fx + fx * a * a, -fx * b
+    J[1, 1], J[2, 1], J[3, 1], J[4, 1], J[5, 1] = fy / z, -fy * b / z, -fy - fy * b * b, fy * a * b, fy * a
+    Jw = (J * w).reshape(6, -1)
+    H, g = Jw @ J.reshape(6, -1).T, Jw @ e.ravel()  # eq-track-normal
+    return _Weighed(H, g, w, sigma, _trouble(H, w))
+
+
 def _trouble(H: Array, w: Array) -> int:
     """What keeps normal equations from an answer."""
     if np.count_nonzero(w) < LEAST_POINTS:
         return FEW
     d = np.sqrt(np.diag(H))
-    determined = (d > 0).all() and np.linalg.cond(H / d[:, None] / d) <= WORST
-    return FINE if determined else UNDETERMINED
+    if not (d > 0).all():
+        return UNDETERMINED
+    values = np.linalg.eigvalsh(H / d[:, None] / d)
+    return FINE if values[-1] <= WORST * values[0] else UNDETERMINED

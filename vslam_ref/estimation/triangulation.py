@@ -17,7 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray
+from vslam_ref.geometry.cameras import Pinhole
 from vslam_ref.geometry.multiview.point_state import PointState, StateArray
 from vslam_ref.geometry.multiview.triangulation import MIN_PARALLAX, as_mask, refuse, triangulate_linear
 from vslam_ref.geometry.multiview.views import Views
@@ -137,23 +139,23 @@ def triangulate(
     X[blind] = 0.0
     seen = (views.project(X).valid | ~used).all(axis=1)
     go = np.flatnonzero(seen & ((state == PointState.OK) | (state == PointState.SMALL_PARALLAX)))
-    end = _descend(views, pixels[go], np.where(used, 1.0 / sigma, 0.0)[go], X[go], max_iterations)
+    end = _end(views, pixels[go], np.where(used, 1.0 / sigma, 0.0)[go], X[go], max_iterations)
     X[go] = end.X_world
     state[~seen & (state == PointState.OK)] = PointState.NOT_CONVERGED  # outside a field: nowhere to start
     state[go[~end.converged & (state[go] == PointState.OK)]] = PointState.NOT_CONVERGED
     cov, rmse = np.tile(np.diag([np.inf] * 3), (len(X), 1, 1)), np.full(len(X), np.inf)
-    cov[go], rmse[go] = end.cov_X, end.rmse_px
+    cov[go], rmse[go] = _covariance(end.H), end.rmse_px
     iterations = np.zeros(len(X), dtype=np.int64)
     iterations[go] = end.iterations
     return Triangulation(X, state, start.parallax, cov, rmse, iterations)
 
 
 class _Descent(NamedTuple):
-    """Points (N, 3), whether each settled, covariance, pixels of error, steps tried."""
+    """Points (N, 3), whether each settled, Hessian (N, 3, 3), pixels of error, steps tried."""
 
     X_world: Array
     converged: NDArray[np.bool_]
-    cov_X: Array
+    H: Array
     rmse_px: Array
     iterations: NDArray[np.int64]
 
@@ -164,6 +166,25 @@ class _Linear(NamedTuple):
     cost: Array
     g: Array
     H: Array
+
+
+def _end(views: Views, uv: Array, root: Array, X_start: Array, max_iterations: int) -> _Descent:
+    """Where the descent ends, by the form for pinholes where all cameras are some."""
+    if all(isinstance(camera, Pinhole) for camera in views.each):
+        K = np.stack([camera.params for camera in views.each]).reshape(-1, 4)
+        found = _pinhole_descent(K, views.T_cam_world, uv, root, X_start, max_iterations)
+        return _Descent(*found)
+    return _descend(views, uv, root, X_start, max_iterations)
+
+
+@accelerated("points:pinhole_descent")
+def _pinhole_descent(
+    K: Array, T_cam_world: Array, uv: Array, root: Array, X_start: Array, max_iterations: int
+) -> tuple[Array, NDArray[np.bool_], Array, Array, NDArray[np.int64]]:
+    """Fields of :class:`_Descent` with pinholes K (V, 4) at ``T_cam_world (V, 4, 4)``, any unit of length."""
+    same = (K[:1] == K).all()
+    cameras = Pinhole.from_params(K[0]) if same else [Pinhole.from_params(k) for k in K]
+    return tuple(_descend(Views(cameras, T_cam_world), uv, root, X_start, max_iterations))  # type: ignore[return-value]
 
 
 def _descend(views: Views, uv: Array, root: Array, X_start: Array, max_iterations: int) -> _Descent:
@@ -195,7 +216,7 @@ def _descend(views: Views, uv: Array, root: Array, X_start: Array, max_iteration
         iterations[go] += 1
         converged[won] = _decrement(_Linear(*(a[won] for a in at))) <= settled[won]
         stuck |= damping > MOST
-    return _Descent(X, converged, _covariance(at.H), _rmse(views, uv, root, X), iterations)
+    return _Descent(X, converged, at.H, _rmse(views, uv, root, X), iterations)
 
 
 def _linearise(views: Views, uv: Array, root: Array, X: Array) -> _Linear:

@@ -123,10 +123,15 @@ def is_peak(corners: Corners, score: ArrayLike) -> BoolArray:
     -------
     ndarray of bool, shape (n,)
     """
-    values = np.asarray(score, dtype=np.int16)
-    height, width = corners.shape
+    return _is_peak(corners.xy, corners.row_start, corners.width, np.asarray(score, dtype=np.int64))
+
+
+@accelerated("features:is_peak")
+def _is_peak(xy: Pixels, row_start: IntArray, width: int, score: IntArray) -> BoolArray:
+    """Which corners (n,) stand above their neighbours."""
+    values, height = score.astype(np.int16), len(row_start) - 1
     map_of_scores = np.full((height + 2, width + 2), -1, np.int16)
-    x, y = corners.xy.T + 1
+    x, y = xy.T + 1
     map_of_scores[y, x] = values
     around = [map_of_scores[y + i, x + j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
     return np.asarray(values > np.max(around, axis=0))  # eq-peak

@@ -31,9 +31,15 @@ _POWERS = 19  # the first one left out is 190 / 21! < 4e-18, in C at theta = 0, 
 def rotation_coefficients(theta2: Array) -> Array:
     """c_0 ... c_5 of squared angles, rad^2, shape (...) -> (6, ...)."""
     small = theta2 < SMALL**2
-    c = np.empty((6, *theta2.shape))
-    # small: two series at the top, then downwards
-    q = np.where(small, theta2, 0.0)
+    if small.all():
+        return _by_series(theta2)
+    large = _closed(np.where(small, 1.0, theta2))
+    return np.where(small, _by_series(np.where(small, theta2, 0.0)), large) if small.any() else large
+
+
+def _by_series(q: Array) -> Array:
+    """Two series at the top, then downwards."""
+    c = np.empty((6, *q.shape))
     for k in (5, 4):
         total = np.zeros_like(q)
         for n in range(_TERMS - 1, -1, -1):
@@ -42,13 +48,16 @@ def rotation_coefficients(theta2: Array) -> Array:
     # eq-coefficients
     for k in (3, 2, 1, 0):
         c[k] = 1.0 / factorial(k) - q * c[k + 2]
-    # large: closed forms at the bottom, then upwards; 1 - cos = 2 sin^2(theta / 2) loses nothing
-    q = np.where(small, 1.0, theta2)
+    return c
+
+
+def _closed(q: Array) -> Array:
+    """Closed forms at the bottom, then upwards; 1 - cos = 2 sin^2(theta / 2) loses nothing."""
     theta = np.sqrt(q)
-    large = [np.cos(theta), np.sin(theta) / theta, 2.0 * np.sin(theta / 2) ** 2 / q]
+    c = [np.cos(theta), np.sin(theta) / theta, 2.0 * np.sin(theta / 2) ** 2 / q]
     for k in (1, 2, 3):
-        large.append((1.0 / factorial(k) - large[k]) / q)
-    return np.where(small, c, np.stack(large))
+        c.append((1.0 / factorial(k) - c[k]) / q)
+    return np.stack(c)
 
 
 def expm1_over(x: Array) -> Array:

@@ -25,18 +25,24 @@ def prepare(number: int, grey: ArrayLike, settings: FeatureSettings) -> Prepared
 
 def peaks(picture: PreparedPicture, level: int, settings: FeatureSettings) -> Pixels:
     """Pixels (n, 2) of a level's corners that are stronger than their neighbours."""
-    return picture.corners[level].xy[_stand_out(picture, level, settings)]
+    return picture.corners[level].xy[stand_out(picture, level, settings)]
 
 
-def _stand_out(picture: PreparedPicture, level: int, settings: FeatureSettings) -> BoolArray:
+def stand_out(picture: PreparedPicture, level: int, settings: FeatureSettings) -> BoolArray:
+    """Which of a level's corners (n,) are stronger than their neighbours, in pixels of the level."""
     corners = picture.corners[level]
     return is_peak(corners, corner_score(picture.levels[level], corners.xy, settings.arc))
 
 
-def strong_corners(picture: PreparedPicture, level: int, settings: FeatureSettings) -> IntArray:
-    """Indices (n,) of a level's corners that are peaks and strong, strongest first; pixels of the level."""
+def strong_corners(
+    picture: PreparedPicture, level: int, settings: FeatureSettings, peak: BoolArray | None = None
+) -> IntArray:
+    """Indices (n,) of a level's corners that are peaks and strong, strongest first; pixels of the level.
+
+    ``peak`` is the answer of :func:`stand_out`, where it is known already.
+    """
     image, corners = picture.levels[level], picture.corners[level]
-    peak = _stand_out(picture, level, settings)
+    peak = stand_out(picture, level, settings) if peak is None else peak
     height, width = image.shape
     reach = HALF + 2
     inner = (corners.xy >= reach).all(1) & (corners.xy < (width - reach, height - reach)).all(1)

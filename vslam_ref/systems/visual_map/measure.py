@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import (
     Corners,
@@ -19,7 +20,9 @@ from vslam_ref.features import (
     warp,
     zmssd,
 )
+from vslam_ref.features.fast import Pixels
 from vslam_ref.features.patch_search import AREA, LIMIT, variation
+from vslam_ref.features.templates import SIDE
 from vslam_ref.systems.visual_map.visibility import Sources, Visible, sources, templates
 from vslam_ref.systems.visual_map.visual_map import Bytes, PreparedPicture, VisualMap
 
@@ -115,33 +118,62 @@ def locate(
     image: Bytes, corners: Corners, patches: Templates, uv: Array, radius: Array, looks: Looks = PLAIN
 ) -> Located:
     """Look for patches around ``uv (n, 2)`` within ``radius (n,)``, all in pixels of one level."""
-    patch = patches.patch
-    place, ok = uv.copy(), np.zeros(len(uv), np.bool_)
-    spread = variation(patch)
-    if looks.first_refine:
-        direct = refine(image, patch, uv)
-        near = np.hypot(*(direct.uv - uv).T) <= radius
-        ok = direct.ok & near
-        ok[ok] = alike(image, patch[ok], direct.uv[ok], spread[ok], looks)
+    whole = np.ascontiguousarray(image)
+    return Located(
+        *_locate(
+            whole.reshape(-1),
+            whole.shape[1],
+            corners.xy,
+            corners.row_start,
+            np.ascontiguousarray(patches.patch).reshape(-1, AREA),
+            uv,
+            radius,
+            looks.limit,
+            looks.absolute,
+            looks.measure == "zncc",
+            looks.first_refine,
+        )
+    )
+
+
+@accelerated("looking:locate")
+def _locate(
+    flat: Bytes,
+    width: int,
+    xy: Pixels,
+    row_start: IntArray,
+    patch: Bytes,
+    uv: Array,
+    radius: Array,
+    limit: float,
+    absolute: float,
+    correlate: bool,
+    first_refine: bool,
+) -> tuple[Array, BoolArray]:
+    """Places (n, 2) of templates (n, 64) in an image in rows (H * width,), and which were found (n,)."""
+    image, corners = flat.reshape(-1, width), Corners(xy, row_start, width)
+    square, place, ok = patch.reshape(-1, SIDE, SIDE), uv.copy(), np.zeros(len(uv), np.bool_)
+    spread = variation(square)
+    most = absolute if absolute else limit * spread
+    most = np.broadcast_to(most, len(uv))
+    if first_refine:
+        direct = refine(image, square, uv)
+        ok = direct.ok & (np.hypot(*(direct.uv - uv).T) <= radius)
+        ok[ok] = alike(image, patch[ok], direct.uv[ok], most[ok])
         place[ok] = direct.uv[ok]
     left = np.flatnonzero(~ok)
-    limit = looks.limit if not looks.absolute else looks.absolute / np.maximum(spread[left], 1.0)
-    by_corner = search(
-        image, corners, patch[left], uv[left], radius[left], limit=limit, measure=looks.measure
-    )
-    have = np.flatnonzero(by_corner.corner >= 0)
-    start = corners.xy[by_corner.corner[have]].astype(np.float64)
-    end, rows = refine(image, patch[left[have]], start), left[have]
-    good = end.ok.copy()
-    good[good] = alike(image, patch[rows[good]], end.uv[good], spread[rows[good]], looks)
-    place[rows[good]], ok[rows[good]] = end.uv[good], True
-    return Located(place, ok)
+    share = absolute / np.maximum(spread[left], 1.0) if absolute else limit
+    measure = "zncc" if correlate else "zmssd"
+    by_corner = search(image, corners, square[left], uv[left], radius[left], limit=share, measure=measure)
+    have = left[by_corner.corner >= 0]
+    end = refine(image, square[have], xy[by_corner.corner[by_corner.corner >= 0]])
+    good = end.ok
+    good[good] = alike(image, patch[have[good]], end.uv[good], most[have[good]])
+    place[have[good]], ok[have[good]] = end.uv[good], True
+    return place, ok
 
 
-def alike(image: Bytes, patch: Bytes, uv: Array, spread: Array, looks: Looks) -> BoolArray:
-    """Whether an image at places (n, 2) between its pixels looks like patches (n, 8, 8)."""
+def alike(image: Bytes, patch: Bytes, uv: Array, most: Array) -> BoolArray:
+    """Whether an image at places (n, 2) differs from patches (n, 64) by so much ZMSSD (n,) at most; no unit."""
     here = warp(image, uv, np.broadcast_to(np.eye(2), (len(uv), 2, 2)))
-    flat = patch.reshape(-1, AREA), here.patch.reshape(-1, AREA)
-    if looks.absolute:
-        return np.asarray(here.inside & (zmssd(*flat) <= looks.absolute))
-    return np.asarray(here.inside & (zmssd(*flat) <= looks.limit * spread))
+    return np.asarray(here.inside & (zmssd(patch, here.patch.reshape(-1, AREA)) <= most))

@@ -14,11 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 from vslam_ref.features import Templates, level_from_finest, level_sigma, sampling, search_level, warp
 from vslam_ref.features.templates import AFTER, BEFORE, SIDE
 from vslam_ref.geometry import se3
-from vslam_ref.systems.visual_map.visual_map import Rowlike, VisualMap
+from vslam_ref.geometry.cameras import Camera, Pinhole
+from vslam_ref.systems.visual_map.visual_map import Bytes, Rowlike, VisualMap
 
 MARGIN = 5.0
 """Pixels of the level on which a point is looked for, that it must keep from the border."""
@@ -40,13 +42,31 @@ class Sources(NamedTuple):
 
 def sources(visual_map: VisualMap, points: IntArray) -> Sources:
     """Where points (n,) were first seen."""
+    return _sources(_known(visual_map), points)
+
+
+class _Known(NamedTuple):
+    """Columns of a map: ``T_kf_world`` (K, 4, 4), and of all its points (N) what :class:`VisualMap` says."""
+
+    T_kf_world: Array
+    X_world: Array
+    source_kf: IntArray
+    source_level: IntArray
+    source_uv: Array
+    slope: Array
+
+
+def _known(visual_map: VisualMap) -> _Known:
     table = visual_map.points
-    kf = table["source_kf"][points]
-    row = visual_map.T_kf_world[kf, 2]
-    depth = np.einsum("ni,ni->n", row[:, :3], visual_map.X_world[points]) + row[:, 3]
-    return Sources(
-        kf, table["source_level"][points], table["source_uv"][points], table["slope"][points], depth
-    )
+    names = ("X_world", "source_kf", "source_level", "source_uv", "slope")
+    return _Known(visual_map.T_kf_world, *(table[name] for name in names))
+
+
+def _sources(known: _Known, points: IntArray) -> Sources:
+    kf = known.source_kf[points]
+    row = known.T_kf_world[kf, 2]
+    depth = np.einsum("ni,ni->n", row[:, :3], known.X_world[points]) + row[:, 3]
+    return Sources(kf, known.source_level[points], known.source_uv[points], known.slope[points], depth)
 
 
 class Visible(NamedTuple):
@@ -95,24 +115,42 @@ def visible(visual_map: VisualMap, T_cam_world: ArrayLike, points: ArrayLike | N
     """
     T = as_array("T_cam_world", T_cam_world, 4, 4)
     number = np.flatnonzero(visual_map.alive) if points is None else np.asarray(points, dtype=np.int64)
-    X_cam = se3.act(T, visual_map.X_world[number])
-    height, width = visual_map.shape
-    number, X_cam = _roughly_inside(visual_map, number, X_cam)
-    at = visual_map.camera.project_with_jacobians(X_cam)
+    known, (height, width) = _known(visual_map), visual_map.shape
+    if isinstance(visual_map.camera, Pinhole):
+        K = visual_map.camera.params
+        return Visible(*_pinhole_visible(known, T, number, K, height, width, visual_map.levels))
+    return _visible(known, T, number, visual_map.camera, height, width, visual_map.levels)
+
+
+@accelerated("visibility:pinhole_visible")
+def _pinhole_visible(
+    known: _Known, T_cam_world: Array, number: IntArray, K: Array, height: int, width: int, levels: int
+) -> tuple[IntArray, Array, Array, Array, IntArray]:
+    """Fields of :class:`Visible` with a pinhole K (4,) at ``T_cam_world (4, 4)``, any unit of length."""
+    return _visible(known, T_cam_world, number, Pinhole.from_params(K), height, width, levels)
+
+
+def _visible(
+    known: _Known, T: Array, number: IntArray, camera: Camera, height: int, width: int, levels: int
+) -> Visible:
+    X_cam = se3.act(T, known.X_world[number])
+    number, X_cam = _roughly_inside(camera, height, width, number, X_cam)
+    at = camera.project_with_jacobians(X_cam)
     inside = (at.uv >= 0).all(1) & (at.uv <= (width - 1, height - 1)).all(1) & at.valid
     number, X_cam, uv, J = number[inside], X_cam[inside], at.uv[inside], at.J_point[inside]
-    origin = sources(visual_map, number)
-    A = affine(visual_map, origin, T, J)
-    level = search_level(A * level_sigma(origin.level)[:, None, None], visual_map.levels)
+    origin = _sources(known, number)
+    A = _affine(known.T_kf_world, origin, T, J)
+    level = search_level(A * level_sigma(origin.level)[:, None, None], levels)
     at_level = level_from_finest(uv, np.maximum(level, 0))
     edge = np.array([width, height]) / level_sigma(np.maximum(level, 0))[:, None] - 1 - MARGIN
     good = (level >= 0) & (at_level >= MARGIN).all(1) & (at_level <= edge).all(1)
     return Visible(number, uv, X_cam[:, 2], A, level).only(good)
 
 
-def _roughly_inside(visual_map: VisualMap, number: IntArray, X_cam: Array) -> tuple[IntArray, Array]:
+def _roughly_inside(
+    camera: Camera, height: int, width: int, number: IntArray, X_cam: Array
+) -> tuple[IntArray, Array]:
     """Leave out what is behind the camera or far outside its field, before the lens is asked."""
-    camera, (height, width) = visual_map.camera, visual_map.shape
     border = camera.unproject(np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64))
     if not border.valid.all():
         return number, X_cam
@@ -126,7 +164,11 @@ def affine(visual_map: VisualMap, origin: Sources, T_cam_world: Array, J_point: 
 
     Implements :eq:`eq-patch-affine`.
     """
-    R_cam_kf = se3.rotation(T_cam_world) @ np.swapaxes(se3.rotation(visual_map.T_kf_world), -1, -2)
+    return _affine(visual_map.T_kf_world, origin, T_cam_world, J_point)
+
+
+def _affine(T_kf_world: Array, origin: Sources, T_cam_world: Array, J_point: Array) -> Array:
+    R_cam_kf = se3.rotation(T_cam_world) @ np.swapaxes(se3.rotation(T_kf_world), -1, -2)
     in_plane = origin.slope * origin.depth[:, None, None]
     A: Array = (J_point @ R_cam_kf[origin.kf][:, :, :2]) @ in_plane  # eq-patch-affine
     return A
@@ -137,21 +179,42 @@ def templates(visual_map: VisualMap, origin: Sources, A: Array, level: IntArray)
 
     Implements :eq:`eq-sampling` and :eq:`eq-warp` with the keyframes of a map.
     """
-    at = level_from_finest(origin.uv, origin.level)
-    M = sampling(A, level, origin.level)
-    patch = np.zeros((len(at), SIDE, SIDE), np.uint8)
-    inside = np.zeros(len(at), np.bool_)
+    patch = np.zeros((len(origin.kf), SIDE * SIDE), np.uint8)
+    inside = np.zeros(len(origin.kf), np.bool_)
     for each in range(visual_map.levels):
-        rows = np.flatnonzero(origin.level == each)
-        if len(rows) == 0:
-            continue
-        images = visual_map.image(each)
+        images = visual_map.image(each)  # one under another
         height, width = images.shape[1:]
-        # images lie in one column
-        above = np.stack([np.zeros(len(rows)), origin.kf[rows] * float(height)], 1)
-        found = warp(images.reshape(-1, width), at[rows] + above, M[rows])
-        patch[rows], inside[rows] = found.patch, found.inside & _whole(at[rows], M[rows], height)
-    return Templates(patch, inside)
+        seen = origin.kf, origin.level, origin.uv
+        _read_templates(images.reshape(-1), width, height, each, *seen, A, level, patch, inside)
+    return Templates(patch.reshape(-1, SIDE, SIDE), inside)
+
+
+@accelerated("visibility:read_templates")
+def _read_templates(
+    flat: Bytes,
+    width: int,
+    height: int,
+    each: int,
+    kf: IntArray,
+    source_level: IntArray,
+    source_uv: Array,
+    A: Array,
+    level: IntArray,
+    patch: Bytes,
+    inside: BoolArray,
+) -> None:
+    """Fill in patches (n, 64) of points that were first seen on one level, and whether they were whole (n,).
+
+    The level's images of all keyframes (K * height * width,) lie one under another.
+    """
+    rows = np.flatnonzero(source_level == each)
+    if len(rows) == 0:
+        return
+    at, M = level_from_finest(source_uv[rows], each), sampling(A[rows], level[rows], each)
+    above = np.stack([np.zeros(len(rows)), kf[rows] * float(height)], 1)
+    found = warp(flat.reshape(-1, width), at + above, M)
+    whole = found.inside & _whole(at, M, height)
+    patch[rows[whole]], inside[rows] = found.patch[whole].reshape(-1, SIDE * SIDE), whole
 
 
 def _whole(uv: Array, M: Array, height: int) -> BoolArray:

@@ -130,7 +130,7 @@ class RenderedScene:
         if self.effects.noise > 0:
             rng = np.random.default_rng([self.seed, k])
             light = light + self.effects.noise * rng.standard_normal(light.shape)
-        grey: NDArray[np.uint8] = np.floor(np.clip(light, 0, 255) + 0.5).astype(np.uint8)
+        grey: NDArray[np.uint8] = (np.clip(light, 0, 255) + 0.5).astype(np.uint8)  # rounded half up
         return grey
 
     def depth(self, k: int) -> Array:

@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features import finest_from_level, level_sigma, zmssd
 from vslam_ref.features.fast import Pixels
-from vslam_ref.features.patch_search import AREA, variation
+from vslam_ref.features.patch_search import AREA
 from vslam_ref.features.templates import cut
 from vslam_ref.geometry import se3, so3
-from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.cameras import Camera, Pinhole
 from vslam_ref.systems.visual_map.visual_map import Bytes
 
 PORTION = 4096
@@ -49,8 +50,19 @@ class OnCurve(NamedTuple):
 
 def with_bearings(camera: Camera, xy: Pixels, level: int) -> CornerRays:
     """Give corners of a level their rays."""
-    ray = camera.unproject_with_jacobians(finest_from_level(xy, level))
+    xy = np.ascontiguousarray(xy, np.int32)
+    uv = finest_from_level(xy, level)
+    if isinstance(camera, Pinhole):
+        return CornerRays(xy, *_pinhole_rays(camera.params, uv))
+    ray = camera.unproject_with_jacobians(uv)
     return CornerRays(xy, ray.bearing, ray.J_pixel, ray.valid)
+
+
+@accelerated("curves:pinhole_rays")
+def _pinhole_rays(K: Array, uv: Array) -> tuple[Array, Array, BoolArray]:
+    """Bearings (n, 3), their slopes (n, 3, 2), and which are rays at all (n,), with a pinhole K (4,)."""
+    ray = Pinhole.from_params(K).unproject_with_jacobians(uv)
+    return ray.bearing, ray.J_pixel, ray.valid
 
 
 def essential(T_b_a: Array) -> Array:
@@ -92,6 +104,15 @@ def search_curve(
     -------
     OnCurve
     """
+    flat = np.ascontiguousarray(patch).reshape(-1, AREA)
+    return OnCurve(*_search(flat, a, np.ascontiguousarray(image), b, T_b_a, gates))
+
+
+@accelerated("curves:search_curve")
+def _search(
+    patch: Bytes, a: CornerRays, image: Bytes, b: CornerRays, T_b_a: Array, gates: Gates
+) -> tuple[IntArray, Array]:
+    """Numbers (n,) of the best corners, and their costs, for patches (n, 64)."""
     best = OnCurve(np.full(len(a.xy), -1), np.full(len(a.xy), np.inf))
     if len(a.xy) == 0 or len(b.xy) == 0:
         return best
@@ -111,12 +132,12 @@ def search_curve(
 
 def _share_of_variation(a: Bytes, b: Bytes, row: IntArray, column: IntArray) -> Array:
     """ZMSSD of pairs (p,) of patches over the variation of the first, some thousands at a time."""
-    flat_a, flat_b = a.reshape(-1, AREA), b.reshape(-1, AREA)
+    flat_a, flat_b = a, b.reshape(-1, AREA)
     cost = np.empty(len(row))
     for low in range(0, len(row), PORTION):
         part = slice(low, low + PORTION)
         cost[part] = zmssd(flat_a[row[part]], flat_b[column[part]])
-    share: Array = cost / np.maximum(variation(a), 1.0)[row]
+    share: Array = cost / np.maximum(zmssd(a, 0.0), 1.0)[row]
     return share
 
 

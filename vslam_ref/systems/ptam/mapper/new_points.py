@@ -14,7 +14,7 @@ from vslam_ref.features.templates import cut
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views
-from vslam_ref.systems.ptam.look import peaks, spread, strong_corners
+from vslam_ref.systems.ptam.look import spread, stand_out, strong_corners
 from vslam_ref.systems.ptam.mapper.curve_search import CornerRays, Gates, search_curve, with_bearings
 from vslam_ref.systems.ptam.settings import FeatureSettings, MapperSettings
 from vslam_ref.systems.ptam.tracker.recover import picture_of
@@ -78,16 +78,18 @@ def new_points(
     """
     added = [np.zeros(0, np.int64)]
     near = s.near * median_depth(visual_map, kf)
+    others = [(int(k), picture_of(visual_map, int(k))) for k in partners(visual_map, kf, s.partners)]
     for level in reversed(range(visual_map.levels)):
-        here = _side(visual_map, kf, picture, level, f)
-        xy = picture.corners[level].xy[strong_corners(picture, level, f)]
+        peak = stand_out(picture, level, f)
+        here = _side(visual_map, kf, picture, level, peak)
+        xy = picture.corners[level].xy[strong_corners(picture, level, f, peak)]
         xy = xy[free(visual_map, kf, xy, level, s.spacing)]
         xy = xy[cut(here.image, xy).inside]
         xy = xy[spread(xy, here.image.shape, s.new_points)]
-        for partner in partners(visual_map, kf, s.partners):
+        for partner, shown in others:
             if len(xy) == 0:
                 break
-            there = _side(visual_map, int(partner), picture_of(visual_map, int(partner)), level, f)
+            there = _side(visual_map, partner, shown, level, stand_out(shown, level, f))
             pairs = match(visual_map.camera, xy, here, there, near, s, f)
             numbers, rows = _triangulated(visual_map, here, there, pairs, s)
             added.append(numbers)
@@ -95,8 +97,8 @@ def new_points(
     return np.concatenate(added)
 
 
-def _side(visual_map: VisualMap, kf: int, picture: PreparedPicture, level: int, f: FeatureSettings) -> Side:
-    found = with_bearings(visual_map.camera, peaks(picture, level, f), level)
+def _side(visual_map: VisualMap, kf: int, picture: PreparedPicture, level: int, peak: BoolArray) -> Side:
+    found = with_bearings(visual_map.camera, picture.corners[level].xy[peak], level)
     T = visual_map.T_kf_world[kf]
     return Side(kf, level, picture.levels[level], picture.corners[level], found, T)
 
