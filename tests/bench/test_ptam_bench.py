@@ -38,7 +38,7 @@ def test_only_pictures_with_a_map_count(monkeypatch: pytest.MonkeyPatch) -> None
         return true[number]._replace(mapped=mapped, stages={"prepare": 1.0, "rest": 2.0, "local": 4.0})
 
     monkeypatch.setattr(Ptam, "step", step)
-    times = ptam.timed(ptam.Shown("desk", world.camera, shown))
+    times = ptam.timed(ptam.FilmedPlace("desk", world.camera, shown))
     assert times.tracking.tolist() == [3.0] * len(tracked)
     assert times.mapping.tolist() == [4.0] * len(tracked)
     assert times.tried.tolist() == [len(o.tracked.fine.seen.point) for o in tracked if o.tracked]

@@ -153,7 +153,8 @@ def corner_score(flat, width, xy, arc):
         _brightest_arc(dark, arc, two, four, least)
         for x in range(count):
             centre = np.int64(flat[np.int64(xy[first + x, 1]) * width + xy[first + x, 0]])
-            score[first + x] = max(np.int64(most[x]) - centre, np.int64(least[x]) + centre - 255, 0) - 1
+            brighter, darker = np.int64(most[x]) - centre, np.int64(least[x]) + centre - 255
+            score[first + x] = max(brighter, darker, np.int64(0)) - np.int64(1)
     return score
 
 

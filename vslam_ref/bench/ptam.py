@@ -45,7 +45,7 @@ GOALS_FE_4 = {"numpy": 3.5, "numba": 1.5}
 POINTS = 1000
 
 
-class Shown(NamedTuple):
+class FilmedPlace(NamedTuple):
     """Pictures (K, H, W) of one camera, and where they are from."""
 
     name: str
@@ -73,14 +73,14 @@ def run(quick: bool = False) -> dict[str, Any]:
 
 
 @functools.cache
-def film(frames: int) -> Shown:
+def film(frames: int) -> FilmedPlace:
     """The first pictures of the kitchen, or else of a rendered desk."""
     if catalogue.find("7scenes_redkitchen") is not None:
         sequence = open_sequence("7scenes_redkitchen").part(0, frames, 1)
         assert sequence.camera is not None
-        return Shown("kitchen", sequence.camera, [i.grey for i in sequence if i.grey is not None])
+        return FilmedPlace("kitchen", sequence.camera, [i.grey for i in sequence if i.grey is not None])
     world = scene("desk", 0, size=(640, 480), frames=FRAMES)
-    return Shown("rendered desk, no kitchen", world.camera, [world.frame(k) for k in range(frames)])
+    return FilmedPlace("rendered desk, no kitchen", world.camera, [world.frame(k) for k in range(frames)])
 
 
 def ptam(backend: str, quick: bool) -> list[Row]:
@@ -110,7 +110,7 @@ def ptam(backend: str, quick: bool) -> list[Row]:
     return found
 
 
-def timed(given: Shown) -> Times:
+def timed(given: FilmedPlace) -> Times:
     """One run over the film; before the system, FAST looks at a picture twice, and the second time counts."""
     import cv2
 

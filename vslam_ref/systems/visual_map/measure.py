@@ -174,6 +174,6 @@ def _locate(
 
 
 def alike(image: Bytes, patch: Bytes, uv: Array, most: Array) -> BoolArray:
-    """Whether an image at places (n, 2) differs from patches (n, 64) by so much ZMSSD (n,) at most; no unit."""
+    """Whether an image at places (n, 2) differs from patches (n, 64) by so much (n,) at most; no unit."""
     here = warp(image, uv, np.broadcast_to(np.eye(2), (len(uv), 2, 2)))
     return np.asarray(here.inside & (zmssd(patch, here.patch.reshape(-1, AREA)) <= most))
