@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vslam_ref.experiments.ptam import overlay, raster, running, solids
+from vslam_ref.experiments.visual_slam import overlay, raster, running, solids
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Fov, Pinhole
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import small_world
 
-from vslam_ref.experiments.ptam import overlay, running
+from vslam_ref.experiments.visual_slam import overlay, running
 
 
 def pictures(folder: Path, images: list[np.ndarray]) -> Path:

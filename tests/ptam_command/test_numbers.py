@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vslam_ref.datasets.sequences import Sequence
-from vslam_ref.experiments.ptam.numbers import accuracy
-from vslam_ref.experiments.ptam.paths import trajectory
+from vslam_ref.experiments.visual_slam.numbers import accuracy
+from vslam_ref.experiments.visual_slam.paths import trajectory
 from vslam_ref.geometry import se3
 from vslam_ref.metrics.trajectory import Trajectory
 

@@ -14,7 +14,7 @@ import small_world
 
 from vslam_ref.datasets.calibration_files import read_opencv
 from vslam_ref.datasets.sequences import read_camera
-from vslam_ref.experiments.ptam import overlay
+from vslam_ref.experiments.visual_slam import overlay
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
 from vslam_ref.systems.ptam import refine_camera

@@ -19,7 +19,7 @@ import small_world
 
 from vslam_ref import _kernels
 from vslam_ref.datasets import trajectories
-from vslam_ref.experiments.ptam import running
+from vslam_ref.experiments.visual_slam import running
 from vslam_ref.metrics.trajectory import evaluate
 from vslam_ref.systems.ptam import STAGES
 

@@ -11,11 +11,11 @@ import pytest
 from vslam_ref import cli
 from vslam_ref.experiments.framework import load
 from vslam_ref.experiments.ptam import fig2_3, passes, wrong_matches
-from vslam_ref.experiments.ptam.overlay import Stage
 from vslam_ref.experiments.ptam.passes import PassesConfig
 from vslam_ref.experiments.ptam.recorded import open_recorded, recorded
 from vslam_ref.experiments.ptam.turning_runs import TurningConfig, new_ground, path
 from vslam_ref.experiments.ptam.wrong_matches import WrongMatchesConfig, displacement
+from vslam_ref.experiments.visual_slam.overlay import Stage
 from vslam_ref.features import level_from_finest
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.alignment import Alignment

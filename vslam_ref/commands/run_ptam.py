@@ -21,8 +21,8 @@ from vslam_ref.commands.options import (
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.sequences import Sequence
-    from vslam_ref.experiments.ptam.interrupting import Interrupts
-    from vslam_ref.experiments.ptam.running import Run
+    from vslam_ref.experiments.visual_slam.interrupting import Interrupts
+    from vslam_ref.experiments.visual_slam.running import Run
     from vslam_ref.systems.ptam import ChosenStart
     from vslam_ref.systems.ptam.settings import Settings
 
@@ -113,8 +113,8 @@ def run(options: argparse.Namespace) -> int:
     target, out = json_target(options), folder_target(options.out)
 
     from vslam_ref.commands.tables import table
-    from vslam_ref.experiments.ptam import numbers, report
-    from vslam_ref.experiments.ptam.interrupting import interrupts
+    from vslam_ref.experiments.visual_slam import numbers, report
+    from vslam_ref.experiments.visual_slam.interrupting import interrupts
     from vslam_ref.support import files
     from vslam_ref.systems.ptam.presets import settings_from
 
@@ -194,7 +194,7 @@ def follow(
     interrupted: Interrupts,
 ) -> Run:
     """Run with a progress bar; Ctrl-C ends it after the picture."""
-    from vslam_ref.experiments.ptam import running
+    from vslam_ref.experiments.visual_slam import running
 
     with progress_bar(len(sequence), "picture", "tracking") as bar:
         done = running.run(
@@ -207,7 +207,7 @@ def follow(
 
 def draw(target: Path, done: Run, size: str, interrupted: Interrupts) -> None:
     """Make the film, if one is wanted; Ctrl-C ends it early."""
-    from vslam_ref.experiments.ptam import overlay
+    from vslam_ref.experiments.visual_slam import overlay
 
     if size == "none":
         return

@@ -20,7 +20,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.datasets.sequences import open_sequence
 from vslam_ref.estimation.triangulation import triangulate
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
-from vslam_ref.experiments.ptam import numbers, overlay, running, solids
+from vslam_ref.experiments.visual_slam import numbers, overlay, running, solids
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.geometry.multiview import Views

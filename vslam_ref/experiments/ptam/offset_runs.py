@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.experiments.ptam import numbers, running
 from vslam_ref.experiments.ptam.recorded import RecordedSequence, second_path
+from vslam_ref.experiments.visual_slam import numbers, running
 
 REASON_LENGTH = 200
 

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vslam_ref.experiments.framework import Experiment, Study
-from vslam_ref.experiments.ptam import running
 from vslam_ref.experiments.ptam.offset_claims import claims, counted
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
 from vslam_ref.experiments.ptam.recorded import found, open_recorded, recorded
+from vslam_ref.experiments.visual_slam import running
 from vslam_ref.support.config import assume
 from vslam_ref.systems.ptam.presets import PRESETS, preset
 from vslam_ref.systems.ptam.settings import Settings

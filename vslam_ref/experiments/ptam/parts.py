@@ -18,8 +18,8 @@ import numpy as np
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.framework.claims import LEAST_FOR_EVERY_RUN
-from vslam_ref.experiments.ptam import numbers, running
 from vslam_ref.experiments.ptam.parts_inputs import pictures_of
+from vslam_ref.experiments.visual_slam import numbers, running
 from vslam_ref.support.config import assume
 from vslam_ref.systems.ptam.presets import PRESETS, preset
 from vslam_ref.systems.ptam.settings import Settings

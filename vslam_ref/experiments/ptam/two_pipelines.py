@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 from vslam_ref import _kernels
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
-from vslam_ref.experiments.ptam import numbers
 from vslam_ref.experiments.ptam.parts_inputs import as_sequence
+from vslam_ref.experiments.visual_slam import numbers
 from vslam_ref.support.config import assume
 from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import Ptam

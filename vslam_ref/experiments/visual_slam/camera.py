@@ -8,8 +8,8 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files import CameraFile
-from vslam_ref.experiments.ptam.paths import scale_drift, trajectory
-from vslam_ref.experiments.ptam.running import Run
+from vslam_ref.experiments.visual_slam.paths import scale_drift, trajectory
+from vslam_ref.experiments.visual_slam.running import Run
 from vslam_ref.geometry import se3
 from vslam_ref.metrics.trajectory import absolute_error
 from vslam_ref.systems.ptam.refine_camera import RefinedCamera

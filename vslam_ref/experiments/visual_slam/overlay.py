@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets import video
-from vslam_ref.experiments.ptam import raster, solids
-from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, START, WAITING, Frame, Run, path
+from vslam_ref.experiments.visual_slam import raster, solids
+from vslam_ref.experiments.visual_slam.running import GOOD, LOST, POOR, START, WAITING, Frame, Run, path
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.visual_map.plane import Plane, dominant_plane

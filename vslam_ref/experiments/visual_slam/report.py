@@ -32,11 +32,11 @@ from vslam_ref.datasets import trajectories
 from vslam_ref.datasets.bundle_files.ply import write_ply
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.calibration_files import write_opencv
-from vslam_ref.experiments.ptam.camera import camera_file, camera_rows
-from vslam_ref.experiments.ptam.numbers import Accuracy, accuracy, number_rows
-from vslam_ref.experiments.ptam.overlay import find_plane
-from vslam_ref.experiments.ptam.paths import trajectory
-from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, WAITING, Run, path
+from vslam_ref.experiments.visual_slam.camera import camera_file, camera_rows
+from vslam_ref.experiments.visual_slam.numbers import Accuracy, accuracy, number_rows
+from vslam_ref.experiments.visual_slam.overlay import find_plane
+from vslam_ref.experiments.visual_slam.paths import trajectory
+from vslam_ref.experiments.visual_slam.running import GOOD, LOST, POOR, WAITING, Run, path
 from vslam_ref.geometry import camera_pose
 from vslam_ref.plot.saving import figure_bytes
 from vslam_ref.plot.visual_slam import (

@@ -11,9 +11,19 @@ import numpy as np
 from vslam_ref import _kernels
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Sequence
-from vslam_ref.experiments.ptam.camera import camera_notes, camera_numbers
-from vslam_ref.experiments.ptam.paths import LEAST_THIRD, scale_drift, trajectory
-from vslam_ref.experiments.ptam.running import GOOD, LOST, POOR, START, UNUSABLE, WAITING, Frame, Run, path
+from vslam_ref.experiments.visual_slam.camera import camera_notes, camera_numbers
+from vslam_ref.experiments.visual_slam.paths import LEAST_THIRD, scale_drift, trajectory
+from vslam_ref.experiments.visual_slam.running import (
+    GOOD,
+    LOST,
+    POOR,
+    START,
+    UNUSABLE,
+    WAITING,
+    Frame,
+    Run,
+    path,
+)
 from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.metrics.trajectory import Trajectory, absolute_error
 from vslam_ref.support.config import assumptions
