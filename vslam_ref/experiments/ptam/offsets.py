@@ -38,7 +38,7 @@ class OffsetsConfig:
     """Which runs."""
 
     sequences: tuple[str, ...] = assume(ALL, "", "all of the table; those that are not found are left out")
-    runs: int = assume(10, "offsets", "all of the table")
+    offsets: int = assume(10, "first pictures, or seeds", "of each sequence: all of the table")
     pictures: int = assume(0, "pictures", "of a run at most; 0: to the last")
     preset: str = assume("", "", "the settings as they come; else a named set of them, such as ptam2007")
     seed: int = assume(0, "", "of the system's one generator, as it comes")
@@ -50,9 +50,9 @@ class OffsetsConfig:
             raise ValueError(f"sequences={', '.join(self.sequences)}: need some of {', '.join(recorded())}")
         if self.preset and self.preset not in PRESETS:
             raise ValueError(f"preset={self.preset}: need one of {', '.join(PRESETS)}, or none")
-        if not 1 <= self.runs <= 10 or self.pictures < 0 or self.seed < 0:
-            given = f"runs={self.runs}, pictures={self.pictures}, seed={self.seed}"
-            raise ValueError(f"{given}: need 1 to 10 runs, and no number below 0")
+        if not 1 <= self.offsets <= 10 or self.pictures < 0 or self.seed < 0:
+            given = f"offsets={self.offsets}, pictures={self.pictures}, seed={self.seed}"
+            raise ValueError(f"{given}: need 1 to 10 offsets, and no number below 0")
 
 
 def available(config: OffsetsConfig) -> list[str]:
@@ -67,7 +67,7 @@ def missing(config: OffsetsConfig) -> list[str]:
 
 def offsets(config: OffsetsConfig, name: str) -> Sequence[int]:
     """First pictures of the runs of one sequence."""
-    return list(recorded()[name].offsets[: config.runs])
+    return list(recorded()[name].offsets[: config.offsets])
 
 
 def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
@@ -153,13 +153,13 @@ EXPERIMENTS = (Experiment(
     sample=_sample,
     missing=missing,
     about=ABOUT,
-    quick={"sequences": ("tsukuba",), "runs": 1, "pictures": 40},
+    quick={"sequences": ("tsukuba",), "offsets": 1, "pictures": 40},
 ), Experiment(
     id="ptam-scenes",
     title="PTAM on rendered scenes with exact truth",
     source="A, chapter 2",
     config_type=OffsetsConfig,
-    defaults={"sequences": SCENES, "runs": 5},
+    defaults={"sequences": SCENES, "offsets": 5},
     simulate=simulate,
     points=available,
     name=str,
@@ -169,5 +169,5 @@ EXPERIMENTS = (Experiment(
     figure=figure,
     sample=_sample,
     about=ABOUT,
-    quick={"sequences": ("desk",), "runs": 1, "pictures": 40},
+    quick={"sequences": ("desk",), "offsets": 1, "pictures": 40},
 ))  # fmt: skip
