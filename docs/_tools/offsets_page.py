@@ -103,8 +103,12 @@ def every_run(name: str, runs: dict[str, Any]) -> str:
          str(runs["keyframes"][k]), str(runs["points"][k])]
         for k in range(len(runs["offset"]))
     ]  # fmt: skip
+    refined = any(v is not None and math.isfinite(v) for v in runs["refined_error"])
+    if refined:
+        for k, row in enumerate(rows):
+            row += [shown(runs["refined_error"][k]), shown(runs["refined_drift"][k])]
     heads = ["first", "start", "of all", "after", f"error [{runs['unit']}]", "live", "to COLMAP", "drift",
-             "keyframes", "points"]  # fmt: skip
+             "keyframes", "points"] + ["refined: error", "refined: drift"] * refined  # fmt: skip
     reasons = sorted({r for r in runs["reason"] if r})
     told = "".join(f"\n\nNo start: {reason}" for reason in reasons)
     return f"### {name}: every run\n\n{table(heads, rows)}{told}"

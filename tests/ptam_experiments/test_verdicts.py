@@ -61,7 +61,8 @@ def runs(count: int = 10, **fields: object) -> OffsetRun:
         "second": np.arange(count) + 8, "frames": np.full(count, 100), "tracked": np.full(count, 100),
         "lost": np.zeros(count, int), "share_all": np.ones(count), "share_after": np.ones(count),
         "error": np.full(count, 0.01), "live": np.full(count, 0.02), "second_error": np.full(count, 0.01),
-        "drift": np.ones(count), "keyframes": np.full(count, 9), "points": np.full(count, 900),
+        "drift": np.full(count, 0.8), "refined_error": np.full(count, 0.2),
+        "refined_drift": np.full(count, 0.99), "keyframes": np.full(count, 9), "points": np.full(count, 900),
         "reason": np.full(count, "", "<U200"),
     }  # fmt: skip
     return OffsetRun(**(good | fields))  # type: ignore[arg-type]
@@ -90,6 +91,22 @@ def test_runs_without_a_start_count_as_the_worst() -> None:
     assert set(verdicts(offset_claims.claims(offsets_study({"kitchen": half}, ("kitchen",)))).values()) == {
         NO
     }
+
+
+def test_a_refined_camera_is_judged_too() -> None:
+    both = ("kitti-refined-error", "kitti-refined-drift")
+    wrong = runs(refined_error=np.full(10, 0.5), refined_drift=np.full(10, 0.8))
+    never = runs(refined_error=np.full(10, np.nan), refined_drift=np.full(10, np.nan))
+    for data, expected in (
+        (runs(), YES),
+        (wrong, NO),
+        (never, NO),
+        (runs(refined_drift=np.full(10, 1.2)), NO),
+    ):
+        found = verdicts(offset_claims.claims(offsets_study({"kitti": data}, ("kitti",))))
+        assert found["kitti-refined-drift"] == expected
+        assert found["kitti-refined-error"] == (YES if data.refined_error[0] < 0.35 else NO)
+        assert set(both) <= set(found)
 
 
 def test_what_is_not_there_is_not_testable() -> None:

@@ -116,13 +116,14 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.experiments.visual_slam import numbers, report
     from vslam_ref.experiments.visual_slam.interrupting import interrupts
     from vslam_ref.support import files
+    from vslam_ref.systems.ptam import KERNELS
     from vslam_ref.systems.ptam.presets import settings_from
 
     assert out is not None  # --out is required
     settings = settings_from([*options.set, *(["camera.refine=true"] * options.refine_camera)])
     sequence = open_source(options)
     chosen = chosen_start(options.start, sequence)
-    warm("features", "patches", "pose", "bundle", "bundle_schur")
+    warm(*KERNELS)
     with files.new_folder(out) as folder, interrupts() as interrupted:
         began = time.perf_counter()
         done = follow(sequence, settings, chosen, options.concurrent, interrupted)

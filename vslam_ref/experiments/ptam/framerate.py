@@ -21,6 +21,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.ptam.fig2_2 import MAPPER
 from vslam_ref.support.config import assume
+from vslam_ref.systems.ptam import KERNELS
 from vslam_ref.systems.ptam.ptam import Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.worlds.rendered import Effects, scene
@@ -92,7 +93,7 @@ def simulate(config: FramerateConfig, case: SceneOnBackend, unit: None) -> Frame
     rows = []
     with _kernels.use_backend(case.backend):
         if case.backend == "numba":
-            _kernels.warm("features", "patches", "pose", "bundle", "bundle_schur")
+            _kernels.warm(*KERNELS)
         system = Ptam(made.camera, Settings())
         for k, image in enumerate(grey):
             outcome = system.step(k, image)

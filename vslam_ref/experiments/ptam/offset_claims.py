@@ -58,8 +58,36 @@ def _bounds(each: RecordedSequence, runs: OffsetRun | None) -> list[Claim]:
               lambda r: _judged_error(r.error), False, f" {each.error_unit}"),
         Bound("second-opinion", "distance of the final path from COLMAP's", each.most_second,
               lambda r: _judged_error(r.second_error), False, f" {each.error_unit}"),
+        Bound("refined-error", "error of a second run, with the camera that a first one refined",
+              each.most_refined, lambda r: _judged_error(r.refined_error), False, f" {each.error_unit}"),
     )  # fmt: skip
-    return [_bound(each, runs, row) for row in rows if row.limit is not None]
+    claims = [_bound(each, runs, row) for row in rows if row.limit is not None]
+    return claims + ([_drift(each, runs)] if each.refined_drift else [])
+
+
+def _drift(each: RecordedSequence, runs: OffsetRun | None) -> Claim:
+    """The drift with the refined camera, in a band."""
+    low, high = each.refined_drift
+    text = f"{each.name}: with the camera that a first run refined, the scale hardly drifts"
+    rule = f"median over the runs of the drift of the second run within {low:g} to {high:g}"
+    if runs is None:
+        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
+        return judged(f"{each.name}-refined-drift", HERE, text, rule, None, why, {}, runs=0)
+    values = np.asarray(runs.refined_drift, np.float64)
+    given, middle = float(np.median(_judged_error(runs.drift))), float(np.median(_judged_error(values)))
+    return judged(
+        f"{each.name}-refined-drift",
+        HERE,
+        text,
+        rule,
+        low <= middle <= high,
+        f"{each.name}: the last third's scale over the first's is {_said(given)} with the camera as given, "
+        f"{_said(middle)} with the refined one, in the median; {low:g} to {high:g} asked for{_seen(each)}",
+        {"given": _finite(given), "median": _finite(middle), "runs": [_finite(v) for v in values]},
+        share=float(np.mean((values >= low) & (values <= high))),
+        runs=len(values),
+        least_runs=LEAST_FOR_EVERY_RUN,
+    )
 
 
 def _bound(each: RecordedSequence, runs: OffsetRun | None, bound: Bound) -> Claim:

@@ -32,6 +32,8 @@ class OffsetRun(NamedTuple):
         Of the final path, of the live path, and of the final path against the other one; in the table's unit.
     drift : ndarray
         Scale of the last third over that of the first.
+    refined_error, refined_drift : ndarray
+        Of a second run with the camera that a first one has refined.
     keyframes, points : ndarray
     reason : ndarray of str
         Why there was no start.
@@ -50,13 +52,17 @@ class OffsetRun(NamedTuple):
     live: Array
     second_error: Array
     drift: Array
+    refined_error: Array
+    refined_drift: Array
     keyframes: IntArray
     points: IntArray
     reason: NDArray[np.str_]
 
 
-def told(each: RecordedSequence, offset: int, done: running.Run) -> OffsetRun:
-    """Return the numbers of a run that began with picture ``offset``."""
+def told(
+    each: RecordedSequence, offset: int, done: running.Run, refined: running.Run | None = None
+) -> OffsetRun:
+    """Return the numbers of a run that began with picture ``offset``, and of one with a refined camera."""
     which, T = running.path(done)
     final = numbers.accuracy(done.sequence, which, T)
     live = numbers.accuracy(done.sequence, *running.path(done, live=True))
@@ -68,6 +74,8 @@ def told(each: RecordedSequence, offset: int, done: running.Run) -> OffsetRun:
     kept = 0 if started is None else int((which >= started[1]).sum())
     first_two = (-1, -1) if started is None else started
     visual_map = done.system.map
+
+    again = None if refined is None else numbers.accuracy(refined.sequence, *running.path(refined))
 
     def scaled(found: numbers.Accuracy | None) -> float:
         value = None if found is None else getattr(found, each.error)
@@ -87,6 +95,8 @@ def told(each: RecordedSequence, offset: int, done: running.Run) -> OffsetRun:
         np.array(scaled(live)),
         np.array(scaled(second)),
         np.array(np.nan if final.drift is None else final.drift),
+        np.array(scaled(again)),
+        np.array(np.nan if again is None or again.drift is None else again.drift),
         np.array(0 if visual_map is None else len(visual_map.keyframes)),
         np.array(0 if visual_map is None else int(visual_map.alive.sum())),
         np.array(done.no_start() or "", f"<U{REASON_LENGTH}"),

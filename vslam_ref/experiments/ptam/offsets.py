@@ -22,7 +22,7 @@ from vslam_ref.experiments.ptam.offset_claims import claims, counted
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
 from vslam_ref.experiments.ptam.recorded import found, open_recorded, recorded
 from vslam_ref.experiments.visual_slam import running
-from vslam_ref.support.config import assume
+from vslam_ref.support.config import assume, replace_settings
 from vslam_ref.systems.ptam.presets import PRESETS, preset
 from vslam_ref.systems.ptam.settings import Settings
 
@@ -79,8 +79,16 @@ def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
         return done.system.map is None and len(done.frames) >= each.start_within
 
     settings = preset(config.preset) if config.preset else Settings()
-    done = running.run(sequence, replace(settings, seed=config.seed), stop)
-    return told(each, offset, done)
+    settings = replace(settings, seed=config.seed)
+    done = running.run(sequence, settings, stop)
+    if each.most_refined is None:
+        return told(each, offset, done)
+    first = running.run(sequence, replace_settings(settings, {"camera.refine": True}), stop)
+    refined = first.system.refined
+    if refined is None:
+        return told(each, offset, done)
+    second = running.run(replace(sequence, camera=refined.camera), settings, stop)
+    return told(each, offset, done, second)
 
 
 # --- what is written ------------------------------------------------------------------------------
@@ -128,6 +136,8 @@ ABOUT = {
     "live": "error of the live path, in the table's unit; (runs,)",
     "second_error": "distance from the other path, in the table's unit; (runs,)",
     "drift": "scale of the last third over that of the first; (runs,)",
+    "refined_error": "error of a second run with the camera that a first one refined; (runs,)",
+    "refined_drift": "drift of that run; (runs,)",
     "keyframes": "keyframes; (runs,)",
     "points": "points of the map; (runs,)",
     "reason": "why there was no start; (runs,)",

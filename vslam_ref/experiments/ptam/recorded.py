@@ -43,6 +43,8 @@ class RecordedSequence:
         From the truth's unit to ``error_unit``.
     second : str
         File of another path in the data set, or empty.
+    refined_drift : tuple of float
+        Band of the drift with the refined camera; empty where none is asked for.
     camera : tuple of float
         fx, fy, cx, cy where the data set has no camera.
     noise, exposure : float
@@ -66,6 +68,8 @@ class RecordedSequence:
     most_error: float | None = None
     second: str = ""
     most_second: float | None = None
+    most_refined: float | None = None
+    refined_drift: tuple[float, ...] = ()
     camera: tuple[float, ...] = ()
     noise: float = 0.0
     exposure: float = 0.0

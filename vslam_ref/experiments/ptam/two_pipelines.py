@@ -23,6 +23,7 @@ from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.ptam.parts_inputs import as_sequence
 from vslam_ref.experiments.visual_slam import numbers
 from vslam_ref.support.config import assume
+from vslam_ref.systems.ptam import KERNELS
 from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import Ptam
 from vslam_ref.systems.ptam.settings import Settings
@@ -66,7 +67,7 @@ class LatencyRun(NamedTuple):
 def follow(config: TwoPipelinesConfig) -> LatencyRun:
     """Run every desk both ways, one after the other."""
     if _kernels.backend() == "numba":
-        _kernels.warm("features", "patches", "pose", "bundle", "bundle_schur")
+        _kernels.warm(*KERNELS)
     latency: dict[str, list[Array]] = {way: [] for way in WAYS}
     error: dict[str, list[float]] = {way: [] for way in WAYS}
     for seed in np.random.SeedSequence(config.seed).spawn(config.runs):

@@ -27,7 +27,13 @@ from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
 
+KERNELS = (
+    "bundle", "bundle_schur", "curves", "features", "looking", "patches", "points", "pose", "visibility",
+)  # fmt: skip
+"""Modules of compiled loops that a run needs, for those who prepare them before they look at a clock."""
+
 __all__ = [
+    "KERNELS",
     "STAGES",
     "ChosenStart",
     "ConcurrentPtam",
