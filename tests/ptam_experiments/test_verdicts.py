@@ -93,6 +93,12 @@ def test_runs_without_a_start_count_as_the_worst() -> None:
     }
 
 
+def test_one_late_start_is_too_many() -> None:
+    late = runs(started=np.arange(10) != 4)
+    found = [verdicts(offset_claims.claims(offsets_study({"alva": r}, ("alva",)))) for r in (runs(), late)]
+    assert [f["alva-starts"] for f in found] == [YES, NO]
+
+
 def test_a_refined_camera_is_judged_too() -> None:
     both = ("kitti-refined-error", "kitti-refined-drift")
     wrong = runs(refined_error=np.full(10, 0.5), refined_drift=np.full(10, 0.8))

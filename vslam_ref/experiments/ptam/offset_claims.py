@@ -62,7 +62,33 @@ def _bounds(each: RecordedSequence, runs: OffsetRun | None) -> list[Claim]:
               each.most_refined, lambda r: _judged_error(r.refined_error), False, f" {each.error_unit}"),
     )  # fmt: skip
     claims = [_bound(each, runs, row) for row in rows if row.limit is not None]
-    return claims + ([_drift(each, runs)] if each.refined_drift else [])
+    claims += [_drift(each, runs)] if each.refined_drift else []
+    return [_all_start(each, runs), *claims] if each.all_start else claims
+
+
+def _all_start(each: RecordedSequence, runs: OffsetRun | None) -> Claim:
+    """Every run must have a map in time."""
+    text = f"{each.name}: every run has a map within {each.start_within} pictures"
+    rule = "in every run"
+    id = f"{each.name}-starts"
+    if runs is None:
+        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
+        return judged(id, HERE, text, rule, None, why, {}, runs=0)
+    started = np.asarray(runs.started, bool)
+    late = ", ".join(str(offset) for offset in np.asarray(runs.offset)[~started])
+    return judged(
+        id,
+        HERE,
+        text,
+        rule,
+        bool(started.all()),
+        f"{each.name}: {int(started.sum())} of {len(started)} runs had a map within {each.start_within} "
+        f"pictures{f'; those from {late} had none' if late else ''}{_seen(each)}",
+        {"started": int(started.sum()), "runs": len(started)},
+        share=float(started.mean()),
+        runs=len(started),
+        least_runs=LEAST_FOR_EVERY_RUN,
+    )
 
 
 def _drift(each: RecordedSequence, runs: OffsetRun | None) -> Claim:

@@ -49,7 +49,7 @@ class RecordedSequence:
         fx, fy, cx, cy where the data set has no camera.
     noise, exposure : float
         Of a rendered scene: grey levels, and a share.
-    must_not_start, seen : bool
+    all_start, must_not_start, seen : bool
     beside : tuple of mapping
         Of other systems.
     """
@@ -73,6 +73,7 @@ class RecordedSequence:
     camera: tuple[float, ...] = ()
     noise: float = 0.0
     exposure: float = 0.0
+    all_start: bool = False
     must_not_start: bool = False
     beside: tuple[Mapping[str, Any], ...] = field(default=())
 
