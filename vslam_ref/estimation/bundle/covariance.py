@@ -31,7 +31,7 @@ from vslam_ref.estimation.bundle.gauge import fix_gauge, gauge_directions
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.result import BundleResult
 from vslam_ref.estimation.bundle.structure import Structure, structure
-from vslam_ref.estimation.bundle.undamped import Blocks, UndampedSystem
+from vslam_ref.estimation.bundle.undamped import UndampedColumns, UndampedSystem
 
 Gauge = Literal["fixed", "free"]
 
@@ -132,7 +132,7 @@ class _Chosen(NamedTuple):
         """Columns of the views' coordinates, and numbers of the sorted points."""
         return table.columns[self.views][:, :6].ravel(), np.argsort(table.point_order)[self.points]
 
-    def units(self, table: Structure) -> Blocks:
+    def units(self, table: Structure) -> UndampedColumns:
         """Unit vectors of the chosen coordinates; zero for what is fixed."""
         columns, points = self.places(table)
         k, count = len(columns), len(columns) + 3 * len(points)
@@ -141,9 +141,9 @@ class _Chosen(NamedTuple):
         view[table.size] = 0.0
         for axis in range(3):
             point[points, axis, k + axis + 3 * np.arange(len(points))] = 1.0
-        return Blocks(view, point)
+        return UndampedColumns(view, point)
 
-    def of(self, blocks: Blocks, table: Structure) -> Array:
+    def of(self, blocks: UndampedColumns, table: Structure) -> Array:
         """Rows of the chosen coordinates, (6 k + 3 m, columns)."""
         columns, points = self.places(table)
         return np.concatenate([blocks.view[columns], blocks.point[points].reshape(-1, blocks.view.shape[1])])

@@ -21,7 +21,7 @@ from vslam_ref.estimation.bundle.structure import Structure
 from vslam_ref.estimation.bundle.weights import whitened
 
 
-class Blocks(NamedTuple):
+class UndampedColumns(NamedTuple):
     """Columns over all unknowns, each row in its coordinate's unit: metres, radians, or the lens's.
 
     ``view (D + 1, k)`` of the views' coordinates, the last row of what is fixed; ``point (N, 3, k)`` of the
@@ -95,7 +95,7 @@ class UndampedSystem(NamedTuple):
         """Standard deviation of a whitened coordinate, from the residuals; infinite without redundancy."""
         return math.sqrt(self.square / self.redundancy) if self.redundancy > 0 else math.inf
 
-    def solve(self, view: Array, point: Array) -> Blocks:
+    def solve(self, view: Array, point: Array) -> UndampedColumns:
         """Inverse normal matrix times some columns, by elimination of the points: the chapter's two rows."""
         assert self.factor is not None
         table, W, M_T = self.table, self.normal.W, np.swapaxes(self.M, 1, 2)
@@ -105,7 +105,7 @@ class UndampedSystem(NamedTuple):
         x = np.vstack([self.factor.solve(view[:-1]), np.zeros((1, view.shape[1]))])
         back = np.matmul(np.swapaxes(W, 1, 2), x[at]).reshape(len(W), -1)
         pulled = sum_by_point(back, table.offsets).reshape(point.shape)
-        return Blocks(x, self.M @ (M_T @ (point - pulled)))
+        return UndampedColumns(x, self.M @ (M_T @ (point - pulled)))
 
 
 def _factors(normal: Normal, table: Structure) -> Array:

@@ -5,7 +5,7 @@
     tracker (the caller's thread)                      mapper (its own thread)
     picture -> shown map -> pose -> keyframe? -- Handed -->  waiting ... map_keyframe on the map
                    ^                                              |
-                   +------------ snapshot, Mapped <---------------+
+                   +------------ snapshot, InMap <----------------+
 
 The tracker only reads the *shown* map, a snapshot that nobody changes; a newer one is taken between two
 pictures.  Poses are carried over by their reference keyframe: what was near keyframe k stays near it,
@@ -64,7 +64,7 @@ class Handed(NamedTuple):
     found: IntArray
 
 
-class Mapped(NamedTuple):
+class InMap(NamedTuple):
     """A keyframe that is in the map: number of the picture, what it brought, CPU seconds by stage."""
 
     number: int
@@ -95,7 +95,7 @@ class MapperThread:
         self._map, self._settings = visual_map, settings
         self._shown = visual_map.snapshot()
         self._waiting: deque[Handed] = deque()
-        self._ready: deque[Mapped] = deque()
+        self._ready: deque[InMap] = deque()
         self._busy = self._ending = False
         self._error: BaseException | None = None
         self._change = threading.Condition()
@@ -113,7 +113,7 @@ class MapperThread:
         with self._change:
             return self._unfinished()
 
-    def collect(self) -> tuple[VisualMap, list[Mapped]]:
+    def collect(self) -> tuple[VisualMap, list[InMap]]:
         """Return the map as it is shown now, and the keyframes that are in it since the last call.
 
         Raises
@@ -157,7 +157,7 @@ class MapperThread:
                 shown = self._map.snapshot()
                 with self._change:
                     self._shown, self._busy = shown, False
-                    self._ready.append(Mapped(handed.picture.number, mapped, watch.seconds))
+                    self._ready.append(InMap(handed.picture.number, mapped, watch.seconds))
                     self._change.notify_all()
         except BaseException as error:  # it surfaces in the tracker's thread
             with self._change:
@@ -219,7 +219,7 @@ class ConcurrentPtam(Ptam):
             self.shown = shown
         return shown
 
-    def _finished(self, done: Mapped) -> None:
+    def _finished(self, done: InMap) -> None:
         """A picture is its own reference now."""
         self.handed_at.popleft()
         live = self.poses[done.number].live

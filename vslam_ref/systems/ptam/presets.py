@@ -15,7 +15,7 @@ from vslam_ref.systems.ptam.settings import Settings
 KEY = "preset"
 
 
-class Choice(NamedTuple):
+class Override(NamedTuple):
     """A setting, by its dotted key, the value that it takes in its own unit, and why."""
 
     key: str
@@ -27,7 +27,7 @@ class Preset(NamedTuple):
     """What a set of settings means, in one sentence, and its choices."""
 
     meaning: str
-    choices: tuple[Choice, ...]
+    choices: tuple[Override, ...]
 
     @property
     def overrides(self) -> dict[str, Any]:
@@ -38,58 +38,58 @@ class Preset(NamedTuple):
 PAPER, PROGRAM = "the paper of 2007", "the program that its authors published later; the paper has no number"
 NEVER, ALL = 0.0, 1_000_000
 PTAM_2007 = (
-    Choice("features.least_eigenvalue", 35.0, f"70 in PTAM's unit, which is half of this one: {PROGRAM}"),
-    Choice("features.absolute", 32000.0, f"500 squared grey levels for each of 64 pixels: {PROGRAM}"),
-    Choice("features.first_refine", False, f"patches are looked for at corners only: {PAPER}"),
-    Choice("start.trails", 1000, f"corners that are followed from the first picture: {PAPER}"),
-    Choice("tracker.coarse_points", 50, PAPER),
-    Choice("tracker.fine_points", 1000, PAPER),
-    Choice("tracker.coarse_least", 20, PROGRAM),
-    Choice("tracker.radius", (30.0, 30.0, 30.0), f"only the first is used: {PROGRAM}"),
-    Choice("tracker.small_image", False, f"a decaying velocity is the only guess: {PAPER}"),
-    Choice("tracker.decay", 0.9, PROGRAM),
-    Choice("tracker.newest", 0.5, PROGRAM),
-    Choice("tracker.follow", False, f"a lost camera is found again by keyframes only: {PAPER}"),
-    Choice("keyframe.good_only", True, f"tracking quality must be good: {PAPER}"),
-    Choice("keyframe.gap", 21, f"more than twenty pictures since the last keyframe: {PAPER}"),
-    Choice("keyframe.gap_starving", 21, f"the same: {PAPER}"),
-    Choice("keyframe.far", 0.1, f"least distance from the nearest keyframe, in depths: {PROGRAM}"),
-    Choice("keyframe.fewer", NEVER, f"no rule about the number of points: {PAPER}"),
-    Choice("keyframe.much_fewer", NEVER, f"no rule about the number of points: {PAPER}"),
-    Choice("keyframe.least_inliers", 0, f"no rule about the number of points: {PAPER}"),
-    Choice("keyframe.worst_sigma", 4.0, f"no rule about sigma, beyond that of a lost picture: {PAPER}"),
-    Choice("mapper.search_back", False, f"a match on the epipolar line is taken as it is: {PAPER}"),
-    Choice("mapper.parallax", NEVER, f"the distance of keyframes is trusted to give a base line: {PAPER}"),
-    Choice("mapper.partners", 1, f"the closest keyframe: {PAPER}"),
-    Choice("mapper.new_points", ALL, f"every strong corner: {PAPER}"),
-    Choice("mapper.neighbours", ALL, f"new points are looked for in all keyframes: {PROGRAM}"),
-    Choice("mapper.found", NEVER, f"no point dies because it is seldom found: {PAPER}"),
+    Override("features.least_eigenvalue", 35.0, f"70 in PTAM's unit, which is half of this one: {PROGRAM}"),
+    Override("features.absolute", 32000.0, f"500 squared grey levels for each of 64 pixels: {PROGRAM}"),
+    Override("features.first_refine", False, f"patches are looked for at corners only: {PAPER}"),
+    Override("start.trails", 1000, f"corners that are followed from the first picture: {PAPER}"),
+    Override("tracker.coarse_points", 50, PAPER),
+    Override("tracker.fine_points", 1000, PAPER),
+    Override("tracker.coarse_least", 20, PROGRAM),
+    Override("tracker.radius", (30.0, 30.0, 30.0), f"only the first is used: {PROGRAM}"),
+    Override("tracker.small_image", False, f"a decaying velocity is the only guess: {PAPER}"),
+    Override("tracker.decay", 0.9, PROGRAM),
+    Override("tracker.newest", 0.5, PROGRAM),
+    Override("tracker.follow", False, f"a lost camera is found again by keyframes only: {PAPER}"),
+    Override("keyframe.good_only", True, f"tracking quality must be good: {PAPER}"),
+    Override("keyframe.gap", 21, f"more than twenty pictures since the last keyframe: {PAPER}"),
+    Override("keyframe.gap_starving", 21, f"the same: {PAPER}"),
+    Override("keyframe.far", 0.1, f"least distance from the nearest keyframe, in depths: {PROGRAM}"),
+    Override("keyframe.fewer", NEVER, f"no rule about the number of points: {PAPER}"),
+    Override("keyframe.much_fewer", NEVER, f"no rule about the number of points: {PAPER}"),
+    Override("keyframe.least_inliers", 0, f"no rule about the number of points: {PAPER}"),
+    Override("keyframe.worst_sigma", 4.0, f"no rule about sigma, beyond that of a lost picture: {PAPER}"),
+    Override("mapper.search_back", False, f"a match on the epipolar line is taken as it is: {PAPER}"),
+    Override("mapper.parallax", NEVER, f"the distance of keyframes is trusted to give a base line: {PAPER}"),
+    Override("mapper.partners", 1, f"the closest keyframe: {PAPER}"),
+    Override("mapper.new_points", ALL, f"every strong corner: {PAPER}"),
+    Override("mapper.neighbours", ALL, f"new points are looked for in all keyframes: {PROGRAM}"),
+    Override("mapper.found", NEVER, f"no point dies because it is seldom found: {PAPER}"),
 )
 PRESETS = {
     "ptam2007": Preset("the constants and rules of PTAM as it was published", PTAM_2007),
     "no_warp": Preset(
         "a patch is compared as it was first seen, on the level that fits its size",
-        (Choice("features.warp", False, "the part that is taken out"),),
+        (Override("features.warp", False, "the part that is taken out"),),
     ),
     "least_squares": Preset(
         "the tracker and every adjustment minimise squares instead of Tukey's loss",
-        (Choice("tracker.loss", "l2", "the part that is taken out"),),
+        (Override("tracker.loss", "l2", "the part that is taken out"),),
     ),
     "absolute_score": Preset(
         "a patch must be alike by an absolute limit, not by a share of its own contrast",
-        (Choice("features.absolute", 32000.0, f"500 for each of 64 pixels: {PROGRAM}"),),
+        (Override("features.absolute", 32000.0, f"500 for each of 64 pixels: {PROGRAM}"),),
     ),
     "no_search_back": Preset(
         "a match on the epipolar curve is not searched back into its source",
-        (Choice("mapper.search_back", False, "the part that is taken out"),),
+        (Override("mapper.search_back", False, "the part that is taken out"),),
     ),
     "corners_only": Preset(
         "patches are looked for at corners only, not first where they are expected",
-        (Choice("features.first_refine", False, "the part that is taken out"),),
+        (Override("features.first_refine", False, "the part that is taken out"),),
     ),
     "no_following": Preset(
         "a lost camera is found again by keyframes only, not by following the last patches",
-        (Choice("tracker.follow", False, "the part that is taken out"),),
+        (Override("tracker.follow", False, "the part that is taken out"),),
     ),
 }
 """Name -> preset; the tables of experiments use the same."""
