@@ -137,7 +137,7 @@ def covariance_factor(loss: Loss, dimension: int = 1) -> float:
     --------
     >>> from vslam_ref.estimation.robust import L2, tuned
     >>> round(covariance_factor(tuned("tukey", 2), 2), 4), round(covariance_factor(L2(), 2), 12)
-    (0.9046, 1.0)
+    (0.9044, 1.0)
     """
     r, dm = _norms(loss, dimension)
     return float(np.sum(dm * loss.weight(r))) / efficiency(loss, dimension)
