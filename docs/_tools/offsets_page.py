@@ -145,9 +145,11 @@ def presets(out: Path, whole: dict[str, Any]) -> str:
         meaning = PRESETS[preset].meaning if preset in PRESETS else ""
         rows.append([f"`{preset}`" if meaning else f"**{preset}**", meaning, *cells])
     words = (
-        "Medians of the ten runs: pictures with a pose, of all, and error. A run without a map in time counts "
-        "as the worst, so an error of – means that most had none. On easy films one part more or less changes "
-        "little: the parts overlap. `vslam-ref reproduce ptam-parts` takes each out where it should matter."
+        "Medians of the ten runs: pictures with a pose, of all, and error. A run without a map in time "
+        "counts as "
+        "the worst, so an error of – means that most had none. On easy films one part more or less "
+        "changes little: the parts overlap. `vslam-ref reproduce ptam-parts` takes each out where it "
+        "should matter."
     )
     heads = ["settings", "what they are", *names]
     return f"## One part taken out, and as it was published\n\n{words}\n\n{table(heads, rows)}"
