@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +133,15 @@ def test_a_chosen_start_that_cannot_be_is_told(
     assert "pictures 2 and 3 make no start" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.fixture
+def in_the_foreground() -> Iterator[None]:
+    """Ctrl-C as at a terminal: what a shell starts in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("in_the_foreground")
 def test_an_interrupt_saves_the_run_so_far(
     ran: Any,
     run: Callable[..., int],
@@ -216,6 +225,7 @@ def test_an_exception_while_pictures_come_ends_the_mapper(
     assert not [t for t in threading.enumerate() if t.name == "mapper"]
 
 
+@pytest.mark.usefixtures("in_the_foreground")
 def test_a_second_interrupt_ends_at_once_and_leaves_nothing(
     ran: Any, run: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
