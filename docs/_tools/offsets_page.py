@@ -28,7 +28,7 @@ CAPTION = "Each dot is a run; the line is their median, dashed is the bound."
 HEAD = """\
 # PTAM from ten first pictures
 
-How good is the system of [chapter 12](chapters/12_ptam.md)? One run over one clip says little: where it
+How good is the system of {doc}`chapter 12 <chapters/12_ptam>`? One run over one clip says little: where it
 begins decides which two pictures make the map. So every recorded sequence is run from ten first pictures,
 written down in a table before the runs, and the median is judged. All ten are shown. To repeat it, with the
 data sets:
