@@ -238,3 +238,27 @@ def test_a_second_interrupt_ends_at_once_and_leaves_nothing(
     assert run(ran.source, "--out", tmp_path / "out") == 130
     assert list(tmp_path.iterdir()) == []
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("option", ["--camera", "--truth", "--times"])
+def test_what_a_run_reads_is_never_replaced(
+    option: str, ran: Any, run: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file inside the output folder would be gone after the run."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "result.json").write_text("{}")
+    own = out / "own.txt"
+    own.write_text("x")
+    assert run(ran.source, "--out", out, option, own) == 2
+    assert f"{option} {own} lies in --out {out}, which is replaced" in capsys.readouterr().err
+    assert own.read_text() == "x"
+
+
+@pytest.mark.parametrize("word", ["tracker.coarse_points=0", "mapper.tries=-5", "mapper.near=-1"])
+def test_settings_that_mean_nothing_are_refused(
+    word: str, ran: Any, run: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(ran.source, "--out", tmp_path / "out", "--set", word) == 2
+    assert f"{word}: need" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

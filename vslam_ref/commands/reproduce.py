@@ -112,8 +112,9 @@ def _where(names: Sequence[str]) -> str:
     """Say which data are missing."""
     from vslam_ref.datasets.catalogue import VARIABLE
 
-    sets = f"data set{'s' if len(names) > 1 else ''} {', '.join(names)}"
-    return f"needs the {sets}, not found in {VARIABLE}; 'vslam-ref data' says where to get it"
+    many = len(names) > 1
+    sets, it = f"data set{'s' if many else ''} {', '.join(names)}", "them" if many else "it"
+    return f"needs the {sets}, not found in {VARIABLE}; 'vslam-ref data' says where to get {it}"
 
 
 def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:

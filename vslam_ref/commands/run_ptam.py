@@ -49,7 +49,8 @@ the same bytes.
 (sigma). camera_shift_px: how far from its place the refined camera shows what the given one sees in a pixel,
 largest and RMS over the picture. Run again with '--camera DIR/camera.yaml' to use the camera from the start.
 
-Ctrl-C saves the run so far and ends with status 130; twice, it saves nothing.
+Ctrl-C saves the run so far and ends with status 130; twice in one stage, it saves nothing. While the film is
+drawn, the first one ends the film.
 A scene that allows no start ends with status 0 and the reason.
 '--set tracker.fine_points=500' changes a setting. '--set preset=NAME' changes several; others given beside it
 win:
@@ -111,6 +112,7 @@ def run(options: argparse.Namespace) -> int:
     import time
 
     target, out = json_target(options), folder_target(options.out)
+    keep_inputs(options)
 
     from vslam_ref.commands.tables import table
     from vslam_ref.experiments.visual_slam import numbers, report
@@ -138,6 +140,18 @@ def run(options: argparse.Namespace) -> int:
     print(f"page: {out / 'report.html'}")
     write_json(target, content)
     return INTERRUPTED if done.interrupted else 0
+
+
+def keep_inputs(options: argparse.Namespace) -> None:
+    """Refuse to replace a folder that holds what the run reads."""
+    from vslam_ref.support.errors import InputError
+
+    out = Path(options.out).resolve()
+    given = {"SOURCE": options.source, "--camera": options.camera, "--truth": options.truth,
+             "--times": options.times}  # fmt: skip
+    for name, path in given.items():
+        if path is not None and Path(path).exists() and Path(path).resolve().is_relative_to(out):
+            raise InputError(f"{name} {path} lies in --out {options.out}, which is replaced: give another")
 
 
 def open_source(options: argparse.Namespace) -> Sequence:
@@ -203,6 +217,7 @@ def follow(
         )
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
+    interrupted.ends = "ending the film, saving the run (again: stop at once, save nothing)"
     return done
 
 

@@ -45,10 +45,11 @@ def flow_figure(
         _arrow(panel, ((count - 1 - len(mapper)) * STEP + STEP - WIDE / 2 - GAP, 0.0), (WIDE / 2 + GAP, 0.0))
         _arrow(panel, (0.0, HIGH / 2 + GAP), (2 * STEP - 0.3, UP - HIGH / 2 - GAP))
         panel.text(0.62 * STEP, UP / 2 - 0.02, "is read", fontsize=9, bbox=WHITE)
+        pose = next((k for k, box in enumerate(tracker) if box.name == "pose"), len(tracker) - 1)
         end = (count - 1) * STEP
-        _arrow(panel, (end, UP - HIGH / 2 - GAP), (end, HIGH / 2 + GAP))
-        panel.text(end - 0.1, UP / 2, "keyframe: picture, pose,\nand what was found", fontsize=9, ha="right",
-                   va="center", bbox=WHITE)  # fmt: skip
+        _arrow(panel, (pose * STEP, UP - HIGH / 2 - GAP), (end, HIGH / 2 + GAP))
+        panel.text((pose * STEP + end) / 2 - 0.25, UP / 2, "keyframe: picture, pose,\nand what was found",
+                   fontsize=9, ha="right", va="center", bbox=WHITE)  # fmt: skip
         panel.text(-0.95, UP, f"tracking:\n{pictures} pictures", ha="right", va="center", fontsize=10)
         panel.text(-0.95, 0.0, f"mapping:\n{keyframes} keyframes", ha="right", va="center", fontsize=10)
     return figure

@@ -141,13 +141,15 @@ def _only_keyframes(run: FlowRun) -> Claim:
 def _global(run: FlowRun) -> Claim:
     both = _part(run, "global")
     count, keyframes = int(both.sum()), int(run.keyframe.sum())
+    few = keyframes < Settings().mapper.global_every
     return judged(
         "adjustment-of-all-keyframes",
         "A§2.2.2.2, eq. 2.9",
         "All keyframes are adjusted together, too",
         "the stage that adjusts all keyframes takes part in at least one picture, in keyframes only",
-        count > 0 and not bool((both & ~run.keyframe).any()),
-        f"With {keyframes} new keyframes, all were adjusted together {count} times",
+        None if few else count > 0 and not bool((both & ~run.keyframe).any()),
+        f"With {keyframes} new keyframes, all were adjusted together {count} times"
+        + (", too few keyframes to tell" if few else ""),
         {"times": count, "keyframes": keyframes},
     )
 

@@ -8,12 +8,15 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files import CameraFile
+from vslam_ref.estimation.bundle.self_calibration import LEANS_ON
 from vslam_ref.experiments.visual_slam.paths import scale_drift, trajectory
 from vslam_ref.experiments.visual_slam.running import Run
 from vslam_ref.geometry import se3
 from vslam_ref.metrics.trajectory import absolute_error
 from vslam_ref.systems.ptam.refine_camera import RefinedCamera
 
+CLEAR = 2.0
+"""Standard deviations that a number of the camera must move, for the change to be more than noise."""
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px", "omega": "rad"}
 
 
@@ -83,7 +86,12 @@ def camera_notes(run: Run) -> list[str]:
     told = [refusal(name, refined, limit) for name in refined.refused]
     if refined.reason:
         return [*told, f"the camera is kept as it was given: {refined.reason}"]
-    return [*told, second_run(refined, path_change(run, refined))]
+    told = [*told, second_run(refined, path_change(run, refined))]
+    if within_noise(refined):
+        told.append(
+            f"no number of the camera moved by more than {CLEAR:g} of its sigmas: keep the camera given"
+        )
+    return told
 
 
 def refusal(name: str, refined: RefinedCamera, limit: float) -> str:
@@ -94,8 +102,19 @@ def refusal(name: str, refined: RefinedCamera, limit: float) -> str:
     if not np.isfinite(why.sigma):
         return f"{name} is not determined by this motion (sigma: infinite): {kept}"
     unit = f" {UNITS[name]}" if name in UNITS else ""
+    if why.shift_px <= limit:
+        return (
+            f"{name} can only be told together with {LEANS_ON[name]}, which this motion does not show: {kept}"
+        )
     moved = f"moves a pixel by up to {why.shift_px:.3g} px, limit {limit:.3g}"
     return f"{name} is not determined by this motion (sigma {why.sigma:.3g}{unit}, {moved}): {kept}"
+
+
+def within_noise(refined: RefinedCamera) -> bool:
+    """Whether no intrinsic moved by more than :data:`CLEAR` of its own standard deviations."""
+    given = dict(zip(refined.given.names(), refined.given.params, strict=True))
+    found = dict(zip(refined.camera.names(), refined.camera.params, strict=True))
+    return all(abs(found[n] - given.get(n, 0.0)) <= CLEAR * s for n, s in refined.sigma.items() if n in found)
 
 
 def second_run(refined: RefinedCamera, change: PathChange) -> str:

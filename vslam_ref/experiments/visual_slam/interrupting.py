@@ -11,10 +11,11 @@ from types import FrameType
 
 
 class Interrupts:
-    """Whether somebody pressed Ctrl-C."""
+    """Whether somebody pressed Ctrl-C; ``ends`` says what then happens."""
 
     def __init__(self) -> None:
         self.asked = False
+        self.ends = "saving the run so far (again: stop at once, save nothing)"
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Take the signal: remember the first, raise at the second."""
@@ -22,7 +23,7 @@ class Interrupts:
             raise KeyboardInterrupt
         self.asked = True
         print(
-            "\nvslam-ref: interrupted; saving the run so far (again: stop at once, save nothing)",
+            f"\nvslam-ref: interrupted; {self.ends}",
             file=sys.stderr,
         )
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
-from vslam_ref.support.config import assume
+from vslam_ref.support.config import assume, settings
 from vslam_ref.systems.visual_map import Looks
 
 
@@ -152,6 +153,13 @@ class CameraSettings:
     steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
 
 
+AT_LEAST_ONE = {
+    *("features.levels", "start.trails", "tracker.coarse_points", "tracker.fine_points", "tracker.steps"),
+    *("mapper.partners", "mapper.new_points", "mapper.global_every", "mapper.tries", "mapper.queue"),
+}
+"""Settings of which a run needs one; of the others none may be negative."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """PTAM as it runs."""
@@ -164,3 +172,13 @@ class Settings:
     mapper: MapperSettings = field(default_factory=MapperSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     last_steps: int = assume(40, "", "of the adjustment of everything at the end")
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that mean nothing."""
+        for key, _, value, _, _ in settings(self):
+            for number in value if isinstance(value, tuple) else (value,):
+                if isinstance(number, bool | str):
+                    continue
+                least = 1 if key in AT_LEAST_ONE else 0
+                if not (math.isfinite(number) and number >= least):
+                    raise ValueError(f"{key}={number:g}: need {least} or more")
