@@ -53,10 +53,15 @@ def backend() -> str:
     return _chosen
 
 
+def available() -> list[str]:
+    """Return the backends that are there: ``numpy``, and ``numba`` where it is installed."""
+    return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
+
+
 def _resolve(wanted: str) -> str:
     if wanted not in CHOICES:
         raise ValueError(f"VSLAM_REF_BACKEND={wanted!r}: must be one of {', '.join(CHOICES)}")
-    installed = importlib.util.find_spec("numba") is not None
+    installed = "numba" in available()
     if wanted == "numba" and not installed:
         raise ValueError(
             "VSLAM_REF_BACKEND='numba', but numba is not installed: pip install 'vslam-ref[fast]'"

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.bench.rows import Row, backends, row
+from vslam_ref._kernels import available
+from vslam_ref.bench.rows import Row, row
 
 GOAL_IMPORT, GOAL_FIRST_CALL = 1.5, 1.1
 
@@ -47,7 +48,7 @@ def imports(quick: bool) -> list[Row]:
         ratios.append(_seconds(_timed("import vslam_ref, numpy")) / base)
     case = "import vslam_ref / import numpy"
     rows = [row("IM-1", case, "-", float(np.median(ratios)), "x", GOAL_IMPORT)]
-    if "numba" not in backends():
+    if "numba" not in available():
         return rows
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "empty_kernel.py").write_text(_EMPTY_KERNEL)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from vslam_ref import _kernels
+from vslam_ref._kernels import available
 
 Row = dict[str, Any]
 Part = Callable[[], list[Row]]
@@ -54,11 +54,6 @@ def row(
     return {**record, "bound": f"{'<=' if below else '>='} {bound:g}", "met": "yes" if met else "no"}
 
 
-def backends() -> list[str]:
-    """Backends that are there: ``numpy``, and ``numba`` where it is installed."""
-    return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
-
-
 def measured(suite: str, parts: Mapping[str, Part]) -> list[Row]:
     """Rows of all parts, in turn; on a terminal a line on stderr says which part is being measured.
 
@@ -84,12 +79,12 @@ def on_each_backend(quick: bool, *parts: Callable[[str, bool], list[Row]]) -> di
         with threadpool_limits(1), _kernels.use_backend(backend):
             return part(backend, quick)
 
-    return {f"{p.__name__}, {b}": functools.partial(on, b, p) for b in backends() for p in parts}
+    return {f"{p.__name__}, {b}": functools.partial(on, b, p) for b in available() for p in parts}
 
 
 def each_backend() -> Iterator[str]:
     """Yield the backends' names; while one is out, it is in use, on one thread."""
     with threadpool_limits(1):
-        for backend in backends():
+        for backend in available():
             with _kernels.use_backend(backend):
                 yield backend

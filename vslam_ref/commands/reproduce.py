@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import textwrap
 from collections.abc import Sequence
@@ -130,21 +129,14 @@ def _configure(experiment: Experiment[Any], options: argparse.Namespace) -> Any:
 
 
 def _context(options: argparse.Namespace) -> RunContext:
-    from vslam_ref.experiments.framework.scheduler import RunContext, check_scheduler, dask_client
+    from vslam_ref.experiments.framework.scheduler import RunContext, check_scheduler, cores, dask_client
 
-    jobs = options.jobs or _cores()
+    jobs = options.jobs or cores()
     check_scheduler(options.scheduler, options.dask_address, jobs)
     if options.scheduler == "dask":
         with dask_client(options.dask_address):
             pass  # a cluster that cannot be reached is reported now, not after the first experiment
     return RunContext(jobs, options.scheduler, options.dask_address, progress=True)
-
-
-def _cores() -> int:
-    """Return how many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _print_outcome(outcome: Reproduced) -> None:

@@ -30,8 +30,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from vslam_ref import _kernels
+from vslam_ref._kernels import available
 from vslam_ref.bench.bundle import peers
-from vslam_ref.bench.rows import Part, Row, backends, each_backend, measured, row
+from vslam_ref.bench.rows import Part, Row, each_backend, measured, row
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.bundle_files import read_bal
 from vslam_ref.estimation.bundle import BundleProblem, Options, Scene, bundle_adjust
@@ -121,13 +122,13 @@ def against_scipy(problems: dict[str, BundleProblem], pairs: int) -> list[Row]:
         for _ in range(pairs):
             peer = cpu(peers.scipy_cookbook(problem))
             reached = cost(problem, peer.value.scene)
-            history = ours(problem, backends()[-1]).value.history
+            history = ours(problem, available()[-1]).value.history
             enough = next((k for k, step in enumerate(history, 1) if step.cost <= reached), len(history))
-            for backend in backends():
+            for backend in available():
                 mine = ours(problem, backend, Options(max_iterations=enough))
                 ratios[backend].append(peer.seconds / mine.seconds)
                 excess[backend].append(cost(problem, mine.value.problem.scene) / reached - 1.0)
-        for backend in backends():
+        for backend in available():
             value, goal = median(ratios[backend]), GOALS_BA_1[name, backend]
             rows.append(row("BA-1", f"SciPy recipe / ours, {name}", backend, value, "x", goal, below=False))
             worst = max(excess[backend])
@@ -142,12 +143,12 @@ def against_ceres(problems: dict[str, BundleProblem], pairs: int) -> list[Row]:
         each, whole = defaultdict(list), defaultdict(list)
         for _ in range(pairs):
             peer = cpu(peers.ceres(problem))
-            for backend in backends():
+            for backend in available():
                 mine = ours(problem, backend)
                 step = mine.seconds / mine.value.iterations
                 each[backend].append(step * peer.value.iterations / peer.seconds)
                 whole[backend].append(mine.seconds / peer.seconds)
-        for backend in backends():
+        for backend in available():
             value, goal = median(each[backend]), GOALS_BA_2[backend]
             rows.append(row("BA-2", f"iteration, ours / Ceres, {name}", backend, value, "x", goal))
             value = median(whole[backend])
@@ -156,7 +157,7 @@ def against_ceres(problems: dict[str, BundleProblem], pairs: int) -> list[Row]:
         if "gtsam" not in peers.missing():
             other = cpu(peers.gtsam_lm(problem))
             ratio, case = other.seconds / mine.seconds, f"whole solution, GTSAM / ours, {name}"
-            rows.append(row("BA-2", case, backends()[-1], ratio, "x"))
+            rows.append(row("BA-2", case, available()[-1], ratio, "x"))
             rows.append(_excess("GTSAM", name, problem, other, mine))
     return rows
 
@@ -171,7 +172,7 @@ def steps_to_best(sizes: tuple[int, ...]) -> list[Row]:
     rows = []
     for views in sizes:
         problem = chain(views)
-        result = ours(problem, backends()[-1], Options(cost=1e-9)).value
+        result = ours(problem, available()[-1], Options(cost=1e-9)).value
         peer = peers.ceres(problem, 100)()
         best = min(result.cost, cost(problem, peer.scene))
         mine = next(k for k, step in enumerate(result.history, 1) if step.cost <= NEAR * best)
@@ -188,7 +189,7 @@ def growth(sizes: tuple[int, ...], repeats: int) -> list[Row]:
     """BA-4: time of an iteration, each size over the one before."""
     rows = []
     problems = [chain(views) for views in sizes]
-    for backend in backends():
+    for backend in available():
         found = [[ours(problem, backend, FIVE) for problem in problems] for _ in range(repeats)]
         each = np.array([[timed.seconds / timed.value.iterations for timed in once] for once in found])
         ratios = each[:, 1:] / each[:, :-1]
@@ -221,7 +222,7 @@ with _kernels.use_backend(sys.argv[1]):
 def memory(views: int) -> list[Row]:
     """BA-4: growth of the process's peak, in a fresh interpreter; Linux only."""
     rows = []
-    for backend in backends():
+    for backend in available():
         call = [sys.executable, "-c", _MEMORY, backend, str(views)]
         done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode == 0:

@@ -34,6 +34,13 @@ DASK_TIMEOUT = 10.0
 _chosen_for_good: list[Any] = []
 
 
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class RunContext:
     """How to run, as opposed to what: none of it may change a number of the result.

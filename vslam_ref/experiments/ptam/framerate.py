@@ -9,7 +9,6 @@ Implements A§2.3.
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -71,14 +70,9 @@ class FramerateRun(NamedTuple):
     tried: IntArray
 
 
-def backends() -> list[str]:
-    """NumPy, and Numba where it is installed."""
-    return ["numpy", "numba"] if importlib.util.find_spec("numba") else ["numpy"]
-
-
 def cases(config: FramerateConfig) -> list[SceneOnBackend]:
     """Every scene on every backend."""
-    return [SceneOnBackend(name, backend) for name in config.scenes for backend in backends()]
+    return [SceneOnBackend(name, backend) for name in config.scenes for backend in _kernels.available()]
 
 
 def words(case: SceneOnBackend) -> str:
@@ -111,7 +105,7 @@ def simulate(config: FramerateConfig, case: SceneOnBackend, unit: None) -> Frame
 
 def claims(study: Study[dict[str, FramerateRun]]) -> list[Claim]:
     """Judge A's frame rates, on each backend."""
-    return [_rates(study, backend) for backend in backends()]
+    return [_rates(study, backend) for backend in _kernels.available()]
 
 
 def shares(run: FramerateRun) -> tuple[float, float, float]:
@@ -165,7 +159,8 @@ def figure(study: Study[dict[str, FramerateRun]]) -> Figure:
 
     scenes: Sequence[str] = study.config.scenes
     curves = {
-        name: {b: 1.0 / np.asarray(study.data[f"{name}-{b}"].whole) for b in backends()} for name in scenes
+        name: {b: 1.0 / np.asarray(study.data[f"{name}-{b}"].whole) for b in _kernels.available()}
+        for name in scenes
     }
     return rates_figure(curves, (SLOW, FAST))
 

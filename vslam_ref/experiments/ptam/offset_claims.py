@@ -66,14 +66,19 @@ def _bounds(each: RecordedSequence, runs: OffsetRun | None) -> list[Claim]:
     return [_all_start(each, runs), *claims] if each.all_start else claims
 
 
+def _not_here(each: RecordedSequence, id: str, text: str, rule: str) -> Claim:
+    """Without the pictures nothing can be tested."""
+    why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
+    return judged(id, HERE, text, rule, None, why, {}, runs=0)
+
+
 def _all_start(each: RecordedSequence, runs: OffsetRun | None) -> Claim:
     """Every run must have a map in time."""
     text = f"{each.name}: every run has a map within {each.start_within} pictures"
     rule = "in every run"
     id = f"{each.name}-starts"
     if runs is None:
-        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
-        return judged(id, HERE, text, rule, None, why, {}, runs=0)
+        return _not_here(each, id, text, rule)
     started = np.asarray(runs.started, bool)
     late = ", ".join(str(offset) for offset in np.asarray(runs.offset)[~started])
     return judged(
@@ -97,8 +102,7 @@ def _drift(each: RecordedSequence, runs: OffsetRun | None) -> Claim:
     text = f"{each.name}: with the camera that a first run refined, the scale hardly drifts"
     rule = f"median over the runs of the drift of the second run within {low:g} to {high:g}"
     if runs is None:
-        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
-        return judged(f"{each.name}-refined-drift", HERE, text, rule, None, why, {}, runs=0)
+        return _not_here(each, f"{each.name}-refined-drift", text, rule)
     values = np.asarray(runs.refined_drift, np.float64)
     given, middle = float(np.median(_judged_error(runs.drift))), float(np.median(_judged_error(values)))
     return judged(
@@ -125,8 +129,7 @@ def _bound(each: RecordedSequence, runs: OffsetRun | None, bound: Bound) -> Clai
     rule = f"median over the runs {sign} {limit:g}{bound.unit}; a run without a start counts as the worst"
     id = f"{each.name}-{bound.key}"
     if runs is None:
-        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
-        return judged(id, HERE, text, rule, None, why, {}, runs=0)
+        return _not_here(each, id, text, rule)
     values = bound.scale * bound.value(runs)
     holds = values >= limit if bound.at_least else values <= limit
     middle = float(np.median(values))
@@ -165,8 +168,7 @@ def _no_start(each: RecordedSequence, runs: OffsetRun | None) -> Claim:
     rule = "no run has a map; every run gives a reason"
     id = f"{each.name}-no-start"
     if runs is None:
-        why = f"The pictures of {each.name} (data set {each.data_set}) are not found here"
-        return judged(id, HERE, text, rule, None, why, {}, runs=0)
+        return _not_here(each, id, text, rule)
     started, silent = int(np.sum(runs.started)), int(np.sum(np.asarray(runs.reason) == ""))
     return judged(
         id,

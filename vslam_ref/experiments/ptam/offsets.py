@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -148,36 +148,33 @@ def _sample(study: Study[dict[str, OffsetRun]]) -> int:
     return sum(len(runs.offset) for runs in study.data.values())
 
 
-EXPERIMENTS = (Experiment(
-    id="ptam-offsets",
-    title="PTAM on recorded sequences, from ten first pictures each",
-    source="A, chapter 2",
-    config_type=OffsetsConfig,
-    simulate=simulate,
-    points=available,
-    name=str,
-    seeds=offsets,
-    series=series,
-    claims=claims,
-    figure=figure,
-    sample=_sample,
-    missing=missing,
-    about=ABOUT,
-    quick={"sequences": ("tsukuba",), "offsets": 1, "pictures": 40},
-), Experiment(
-    id="ptam-scenes",
-    title="PTAM on rendered scenes with exact truth",
-    source="A, chapter 2",
-    config_type=OffsetsConfig,
-    defaults={"sequences": SCENES, "offsets": 5},
-    simulate=simulate,
-    points=available,
-    name=str,
-    seeds=offsets,
-    series=series,
-    claims=claims,
-    figure=figure,
-    sample=_sample,
-    about=ABOUT,
-    quick={"sequences": ("desk",), "offsets": 1, "pictures": 40},
-))  # fmt: skip
+SHARED: dict[str, Any] = {
+    "config_type": OffsetsConfig,
+    "simulate": simulate,
+    "points": available,
+    "name": str,
+    "seeds": offsets,
+    "series": series,
+    "claims": claims,
+    "figure": figure,
+    "sample": _sample,
+    "missing": missing,
+    "about": ABOUT,
+}
+EXPERIMENTS = (
+    Experiment(
+        id="ptam-offsets",
+        title="PTAM on recorded sequences, from ten first pictures each",
+        source="A, chapter 2",
+        quick={"sequences": ("tsukuba",), "offsets": 1, "pictures": 40},
+        **SHARED,
+    ),
+    Experiment(
+        id="ptam-scenes",
+        title="PTAM on rendered scenes with exact truth",
+        source="A, chapter 2",
+        defaults={"sequences": SCENES, "offsets": 5},
+        quick={"sequences": ("desk",), "offsets": 1, "pictures": 40},
+        **SHARED,
+    ),
+)

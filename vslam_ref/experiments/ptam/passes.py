@@ -21,6 +21,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.framework.claims import LEAST_FOR_EVERY_RUN
+from vslam_ref.experiments.ptam.wrong_matches import moved
 from vslam_ref.features import level_from_finest, level_sigma
 from vslam_ref.geometry import se3
 from vslam_ref.support.config import assume
@@ -164,9 +165,7 @@ def comparisons(done: Pass, picture: PreparedPicture, radius: float) -> int:
 def _error(visual_map: VisualMap, T: Array, T_true: Array) -> float:
     """Root mean square distance, pixels, between where two poses put the points that both see."""
     X = visual_map.X_world[visible(visual_map, T_true).point]
-    a, b = visual_map.camera.pixel_from_world(T, X), visual_map.camera.pixel_from_world(T_true, X)
-    both = a.valid & b.valid
-    return float(np.sqrt(np.mean(np.sum((a.uv - b.uv)[both] ** 2, -1)))) if both.any() else np.inf
+    return moved(visual_map.camera, T, T_true, X)
 
 
 # --- claims ---------------------------------------------------------------------------------------

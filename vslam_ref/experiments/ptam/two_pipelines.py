@@ -8,7 +8,6 @@ Latencies are this machine's, and need a second core that is idle; they differ f
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 from vslam_ref import _kernels
 from vslam_ref.arrays import Array
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
+from vslam_ref.experiments.framework.scheduler import cores
 from vslam_ref.experiments.ptam.parts_inputs import as_sequence
 from vslam_ref.experiments.visual_slam import numbers
 from vslam_ref.support.config import assume
@@ -107,11 +107,6 @@ def _error(system: Ptam, made: RenderedScene) -> float:
 
 
 # --- claims ---------------------------------------------------------------------------------------
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def claims(study: Study[LatencyRun]) -> list[Claim]:

@@ -23,7 +23,7 @@ from vslam_ref.experiments.framework import Claim, Experiment, Study, between, j
 from vslam_ref.experiments.framework.claims import LEAST_FOR_SHARE
 from vslam_ref.experiments.framework.statistics import interval_of_ratio
 from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Pinhole
+from vslam_ref.geometry.cameras import Camera, Pinhole
 from vslam_ref.support.config import assume
 
 if TYPE_CHECKING:
@@ -135,7 +135,12 @@ def _prediction(config: WrongMatchesConfig, X: Array, rng: np.random.Generator) 
 
 def displacement(T: Array, T_true: Array, X: Array) -> float:
     """How far a pose moves points (n, 3) in the picture against another, root mean square, pixels."""
-    a, b = CAMERA.pixel_from_world(T, X), CAMERA.pixel_from_world(T_true, X)
+    return moved(CAMERA, T, T_true, X)
+
+
+def moved(camera: Camera, T: Array, T_true: Array, X: Array) -> float:
+    """Return the same for any camera; infinite if no point is in both pictures."""
+    a, b = camera.pixel_from_world(T, X), camera.pixel_from_world(T_true, X)
     both = a.valid & b.valid
     return float(np.sqrt(np.mean(np.sum((a.uv - b.uv)[both] ** 2, -1)))) if both.any() else np.inf
 
