@@ -78,7 +78,9 @@ def summary(series: dict[str, Any]) -> str:
     rows = []
     for name, runs in series.items():
         if not any(runs["started"]):
-            rows.append([f"**{name}** (must not start)", f"0 of {len(runs['started'])}", "–", "–", "–", "–", "–"])
+            rows.append(
+                [f"**{name}** (must not start)", f"0 of {len(runs['started'])}", "–", "–", "–", "–", "–"]
+            )
             continue
         share = [s if started else 0.0 for s, started in zip(runs["share_all"], runs["started"], strict=True)]
         finite = [e for e in runs["error"] if e is not None and math.isfinite(e)]
