@@ -73,6 +73,7 @@ def test_printed_written_and_computed_numbers_are_the_same(
     shown = capsys.readouterr().out
     numbers = json.loads(target.read_text())
     assert numbers.pop("versions")["backend"] == _kernels.backend()
+    assert numbers.pop("notes") == []
     assert list(numbers) == KEYS
     assert (numbers["images"], numbers["used"]) == (9, 8)
     assert numbers["skipped"] == [str(folder / "wall.png")]

@@ -54,6 +54,7 @@ def test_printed_written_and_computed_numbers_are_the_same(
     assert run(*files, "--align", mode, "--json", target) == 0
     numbers = json.loads(target.read_text())
     assert numbers.pop("versions")["backend"] == _kernels.backend()
+    assert numbers.pop("notes") == []
     assert list(numbers) == KEYS
     estimate, truth = (trajectories.read(f).trajectory for f in files)
     assert numbers == evaluate(estimate, truth, mode).numbers()

@@ -7,7 +7,15 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, add_set, file_target, json_target, warm, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    add_set,
+    file_target,
+    json_target,
+    print_notes,
+    warm,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.bundle_files import BundleFile
@@ -82,8 +90,7 @@ def run(options: argparse.Namespace) -> int:
     problem = _problem(file, options)
     views, points, seen = problem.sizes
     print(f"{options.file}: {views} cameras, {points} points, {seen} observations")
-    for note in [*file.notes, *diagnose(problem).sentences()]:
-        print(f"note: {note}")
+    notes = print_notes([*file.notes, *diagnose(problem).sentences()])
     with _kernels.use_backend(options.backend) as backend:
         warm("bundle", "bundle_schur")  # compiling is no part of the time
         wall, cpu = time.perf_counter(), time.process_time()
@@ -91,14 +98,19 @@ def run(options: argparse.Namespace) -> int:
         seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     if result.reason in HOPELESS:
         raise ValueError(f"{options.file} {HOPELESS[result.reason]}: nothing was adjusted, nothing written")
-    numbers = _numbers(result) | {"seconds": seconds, "cpu_seconds": cpu_seconds, "backend": backend}
+    numbers = _numbers(result) | {
+        "seconds": seconds,
+        "cpu_seconds": cpu_seconds,
+        "backend": backend,
+        "notes": notes,
+    }
     _show(numbers, result)
+    write_json(target, {**numbers, "notes": notes})
     after = file.at(result.problem.scene)
     if ply is not None:
         write_ply(ply, after)
     if out is not None:
         write_bundle(out, after)
-    write_json(target, numbers)
     return 0
 
 

@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    file_target,
+    json_target,
+    print_backend,
+    print_notes,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.trajectories import TrajectoryFile
@@ -79,12 +86,11 @@ def run(options: argparse.Namespace) -> int:
     rows = [[words, f"{numbers[key]:.6f}" if unit or key == "scale" else f"{numbers[key]}", unit]
             for key, words, unit in ROWS]  # fmt: skip
     print(table(["what", "value", "unit"], rows))
-    for note in _notes(found, (options.estimate, estimate), (options.truth, truth)):
-        print(f"note: {note}")
+    notes = print_notes(_notes(found, (options.estimate, estimate), (options.truth, truth)))
     print_backend()
+    write_json(target, {**numbers, "notes": notes})
     if plot is not None:
         _draw(plot, found, Path(options.estimate).name, options.align)
-    write_json(target, numbers)
     return 0
 
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,15 +83,31 @@ def folder_target(given: str | None) -> Path | None:
     return files.require_new_folder(given, "result.json")
 
 
+def print_notes(notes: Iterable[str]) -> list[str]:
+    """Print what a reader of the numbers should know, each on a line ``note: ...``; return them for ``--json``.
+
+    What is odd in a file and harmless is counted and told here: never dropped in silence, never refused.
+    """
+    said = list(notes)
+    for note in said:
+        print(f"note: {note}")
+    return said
+
+
 def write_json(path: Path | None, content: Mapping[str, Any]) -> None:
-    """Write the numbers, and the versions that made them, in one step, if a path was given."""
+    """Write the numbers, and the versions that made them, in one step, if a path was given.
+
+    The list ``notes`` is always there; it is empty where nothing was odd.
+    """
     if path is None:
         return
     from vslam_ref.support import files
     from vslam_ref.support.json_text import to_json
     from vslam_ref.support.provenance import versions
 
-    files.write_text(path, to_json({**content, "versions": content.get("versions") or versions()}))
+    files.write_text(
+        path, to_json({"notes": [], **content, "versions": content.get("versions") or versions()})
+    )
 
 
 def warm(*modules: str) -> str:

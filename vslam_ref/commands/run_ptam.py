@@ -14,6 +14,7 @@ from vslam_ref.commands.options import (
     folder_target,
     json_target,
     print_backend,
+    print_notes,
     progress_bar,
     warm,
     write_json,
@@ -134,8 +135,7 @@ def run(options: argparse.Namespace) -> int:
         report.write_report(folder, done, content)
         done.interrupted |= interrupted.asked
     print(table(["what", "value", "unit"], numbers.number_rows(content)))
-    for note in content["notes"]:
-        print(f"note: {note}")
+    print_notes(content["notes"])
     print_backend()
     print(f"page: {out / 'report.html'}")
     write_json(target, content)
