@@ -84,7 +84,7 @@ def folder_target(given: str | None) -> Path | None:
 
 
 def print_notes(notes: Iterable[str]) -> list[str]:
-    """Print what a reader of the numbers should know, each on a line ``note: ...``; return them for ``--json``.
+    """Print what a reader of the numbers should know, a line ``note: ...`` each; return them for the JSON.
 
     What is odd in a file and harmless is counted and told here: never dropped in silence, never refused.
     """
