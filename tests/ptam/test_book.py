@@ -135,7 +135,7 @@ def test_trails_are_found_back(film: Film) -> None:
         View(first.levels[0], first.corners[0]),
         View(second.levels[0], second.corners[0]),
         np.array(corners, float),
-        book.S.start.search_radius,
+        2.0 * book.S.start.search_radius,  # their speed is not known
     )
     places = [book.trail([first, second], c) for c in corners]
     kept = np.array([u is not None for u in places])

@@ -44,7 +44,7 @@ def corners_of(picture: PreparedPicture, level: int, numbers: IntArray) -> list[
 
 def alike_near(picture: PreparedPicture, T: Bytes, u: Array) -> mapper.Corner | None:
     """Corner of level 0 near u (2,), pixels, that looks most like a patch, if it is like it at all."""
-    radius = S.start.search_radius
+    radius = 2.0 * S.start.search_radius  # no small images tell where to look
     close = np.flatnonzero((np.abs(picture.corners[0].xy - u) <= radius).all(1))
     corners = corners_of(picture, 0, close)
     k = best_corner(picture.levels[0], corners, T, u, radius)

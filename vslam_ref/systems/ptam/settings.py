@@ -43,7 +43,7 @@ class StartSettings:
     trails: int = assume(800, "points", "PTAM starts with 1000 corners")
     least_trails: int = assume(80, "points", "fewer: the trails begin anew")
     search_radius: float = assume(
-        12.0, "px", "from picture to picture, around where it was going; twice as far while that is unknown"
+        6.0, "px", "from picture to picture, around where it was going; twice as far while that is unknown"
     )
     found_again: float = assume(
         0.5, "share", "fewer found: the picture turned, and the small images may know how"
