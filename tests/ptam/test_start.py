@@ -117,9 +117,27 @@ def test_each_picture_says_why_no_start_was_tried(film: Film) -> None:
     said = [system.step(k, film.pictures[0]).waiting for k in range(3)]
     assert said == ["the first picture", *["the corners have moved 0.00 px: need 8"] * 2]
     black = np.zeros_like(film.pictures[0])
-    assert system.step(3, black).waiting == "0 corners in a picture: need 80"
-    assert "were found again: need 80, begun anew" in system.step(4, film.pictures[0]).waiting
+    assert system.step(3, black).waiting == "passed over: 0 corners in a picture: need 80"
+    assert system.step(4, film.pictures[0]).waiting == "the corners have moved 0.00 px: need 8"
+    elsewhere = film.pictures[0][::-1, ::-1].copy()
+    assert "were found again: need 80, begun anew" in system.step(5, elsewhere).waiting
     system = Ptam(film.camera)
     outcomes = [system.step(k, grey) for k, grey in enumerate(film.pictures[:12])]
     for outcome in outcomes:
         assert bool(outcome.waiting) == (outcome.attempt is None and outcome.tracked is None)
+
+
+def test_a_blank_picture_before_the_start_is_passed_over(film: Film) -> None:
+    """The start is that of the film in which the picture is missing; the blank one has no pose."""
+    grey = np.full_like(film.pictures[0], 120)
+    with_blank, without = Ptam(film.camera), Ptam(film.camera)
+    for k in range(12):
+        outcome = with_blank.step(k, grey if k == 3 else film.pictures[k])
+        if k == 3:
+            assert outcome.waiting == "passed over: 0 corners in a picture: need 80"
+        else:
+            without.step(k, film.pictures[k])
+    assert with_blank.started_at == without.started_at
+    assert without.started_at is not None
+    assert without.started_at[0] == 0
+    assert sorted(with_blank.poses) == sorted(without.poses)

@@ -59,14 +59,15 @@ def map_figure(scene: MapDrawing, title: str) -> Figure:
         for panel, side in zip(panels, SIDES, strict=True):
             _side(panel, scene, side)
         style.legend_below(figure, panels[0], 4)
-        figure.suptitle(title, fontsize=12)
+        figure.suptitle(f"{title}: map and path", fontsize=12)
     return figure
 
 
 def _side(panel: Axes, scene: MapDrawing, side: tuple[str, int, int]) -> None:
     words, a, b = side
     at = [a, b]
-    panel.plot(*scene.points[:, at].T, ".", color=style.SKY, ms=1.6, alpha=0.6, label="point", zorder=1)
+    panel.plot(*scene.points[:, at].T, ".", color=style.SKY, ms=1.6, alpha=0.6, zorder=1)
+    panel.plot([], [], ".", color=style.SKY, ms=6, label="point")  # large enough to be seen in the legend
     if len(scene.truth):
         panel.plot(*scene.truth[:, at].T, "--", color=style.BLACK, lw=0.9, label="truth", zorder=5)
     panel.plot(*scene.path[:, at].T, color=style.VERMILION, lw=2.2, label="path", zorder=3)
@@ -145,11 +146,11 @@ def course_figure(course: CourseDrawing, title: str) -> Figure:
         _points(points, course)
         sigma.plot(course.number, course.sigma, color=style.PURPLE, lw=1.0)
         sigma.set_ylim(bottom=0)
-        sigma.set_ylabel("σ [px of level]")
+        sigma.set_ylabel("σ of matches\n[px of level]")
         _quality(quality, course)
         _time(time, course)
         time.set_xlabel("number of the picture")
-        figure.suptitle(title, fontsize=12)
+        figure.suptitle(f"{title}: tracking", fontsize=12)
     return figure
 
 
@@ -224,7 +225,7 @@ def stages_figure(stages: StagesDrawing, title: str) -> Figure:
             _stack(panel, stages.number, times)
             panel.set_ylabel(f"{words} [ms of CPU]")
         below.set_xlabel("number of the picture")
-        figure.suptitle(title, fontsize=12)
+        figure.suptitle(f"{title}: time of each stage", fontsize=12)
     return figure
 
 

@@ -21,8 +21,14 @@ def suggestion(word: str, valid: Iterable[str]) -> str:
     --------
     >>> suggestion("iekf-fig22", ["iekf-fig2", "other"])
     " (did you mean 'iekf-fig2'?)"
+    >>> suggestion("radius", ["start.radius", "start.trails"])
+    " (did you mean 'start.radius'?)"
     >>> suggestion("zzz", ["iekf-fig2"])
     ''
     """
-    near = difflib.get_close_matches(word, list(valid), n=1)
+    words = list(valid)
+    last = {name.rpartition(".")[2]: name for name in reversed(words)}  # people leave out what stands before
+    near = difflib.get_close_matches(word, words, n=1)
+    if not near:
+        near = [last[name] for name in difflib.get_close_matches(word, list(last), n=1)]
     return f" (did you mean {near[0]!r}?)" if near else ""

@@ -68,6 +68,11 @@ LEGEND = (
     "blue good, orange poor, vermilion lost."
 )
 
+SPREAD = (
+    "σ is the spread of the matches' errors, by their median; the tracker never takes it below "
+    "{floor} px (tracker.least_sigma), so that a few exact matches do not outweigh all others."
+)
+
 
 def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
     """Write all but the film into ``folder``."""
@@ -174,6 +179,7 @@ def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures
         "stages": "Time per stage over pictures",
     }
     images = [pages.image(_embedded(folder / f"{name}.png"), alt[name]) for name in figures]
+    floor = run.settings.tracker.least_sigma
     there = {name: name for name in FILES if (folder / name).exists() or name == "result.json"}
     return pages.page(
         title,
@@ -184,6 +190,7 @@ def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures
         _film(folder / FILM),
         pages.table([], number_rows(content), caption="Numbers", kind="numbers"),
         *images,
+        pages.tag("p", SPREAD.format(floor=f"{floor:g}")),
         _camera(run),
         _start(content),
         _refusals(content["refusals"]),

@@ -159,7 +159,10 @@ class Ptam:
             return self._towards(self.chosen, picture)
         s, f = self.settings.start, self.settings.features
         if self.trails is not None:
-            self.trails = trail_steps.go_on(self.trails, picture, s)
+            went = trail_steps.go_on(self.trails, picture, s)
+            if blank := trail_steps.blank(self.trails, went, picture, s, f):
+                return PictureOutcome(picture.number, waiting=blank)
+            self.trails = went
         if self.trails is None or trail_steps.worn(self.trails, s):
             why = trail_steps.worn(self.trails, s)
             self.trails = trail_steps.begin(picture, s, f)

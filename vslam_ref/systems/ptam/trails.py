@@ -146,6 +146,19 @@ def too_few(trails: Trails, s: StartSettings) -> str:
     return f"{count} corners in a picture: need {s.least_trails}" if count < s.least_trails else ""
 
 
+def blank(
+    trails: Trails, went: Trails, picture: PreparedPicture, s: StartSettings, f: FeatureSettings
+) -> str:
+    """Why a picture is passed over, or nothing: trails end in it, and it has no corners to begin others with.
+
+    Somebody's hand before the lens, or a frame that was not taken: the trails wait for the next picture.
+    """
+    if not len(went.level) < s.least_trails <= len(trails.level):
+        return ""
+    few = too_few(begin(picture, s, f), s)
+    return f"passed over: {few}" if few else ""
+
+
 def too_early(trails: Trails, s: StartSettings) -> str:
     """Why no start is tried yet, or nothing."""
     if trails.length < s.least_motion:
