@@ -216,13 +216,16 @@ def _pinhole_weighed(
     z, root = np.where(valid, z, 1.0), np.where(valid, root, 0.0)
     a, b = np.where(valid, x, 0.0) / z, np.where(valid, y, 0.0) / z
     e = np.stack([(K[0] * a + K[2] - u[:, 0]) * root, (K[1] * b + K[3] - u[:, 1]) * root])
-    size = np.hypot(e[0], e[1])
-    sigma = max(MAD_NORM_2D * float(np.median(size[valid])), least_sigma) if valid.any() else np.inf
-    s = np.maximum(1.0 - (size / (c * sigma)) ** 2, 0.0)
+    square = e[0] * e[0] + e[1] * e[1]
+    sigma = (
+        max(MAD_NORM_2D * float(np.median(np.sqrt(square[valid]))), least_sigma) if valid.any() else np.inf
+    )
+    s = np.maximum(1.0 - square / (c * sigma) ** 2, 0.0)
     w = np.where(valid, s * s, 0.0)
-    J, fx, fy = np.zeros((6, 2, len(z))), K[0] * root, K[1] * root
-    J[0, 0], J[2, 0], J[3, 0], J[4, 0], J[5, 0] = fx / z, -fx * a / z, -fx * a * b, fx + fx * a * a, -fx * b
-    J[1, 1], J[2, 1], J[3, 1], J[4, 1], J[5, 1] = fy / z, -fy * b / z, -fy - fy * b * b, fy * a * b, fy * a
+    J, fx, fy, ab = np.zeros((6, 2, len(z))), K[0] * root, K[1] * root, a * b
+    fx_z, fy_z = fx / z, fy / z
+    J[0, 0], J[2, 0], J[3, 0], J[4, 0], J[5, 0] = fx_z, -a * fx_z, -fx * ab, fx + fx * a * a, -fx * b
+    J[1, 1], J[2, 1], J[3, 1], J[4, 1], J[5, 1] = fy_z, -b * fy_z, -fy - fy * b * b, fy * ab, fy * a
     Jw = (J * w).reshape(6, -1)
     H, g = Jw @ J.reshape(6, -1).T, Jw @ e.ravel()  # eq-track-normal
     return _Weighed(H, g, w, sigma, _trouble(H, w))
