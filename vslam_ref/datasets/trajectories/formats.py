@@ -52,6 +52,8 @@ class TrajectoryFile(NamedTuple):
         Which line of poses of the file, from 0, each pose is; lost frames are left out.
     lines : int
         How many lines of poses the file has.
+    w_first : bool or None
+        Whether the first number of each quaternion was read as w; None for matrices.
     """
 
     trajectory: Trajectory
@@ -62,6 +64,7 @@ class TrajectoryFile(NamedTuple):
     notes: tuple[str, ...] = ()
     places: IntArray | None = None
     lines: int = 0
+    w_first: bool | None = None
 
 
 def seconds(ns: IntArray) -> Array:

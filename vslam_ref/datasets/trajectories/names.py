@@ -26,11 +26,14 @@ _SPELT = {
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 _TIME = re.compile(r"(.*_)?([a-z]*time|[a-z]*stamp)s?|t|ts")
 _METRES = ("m", "meter", "meters", "metre", "metres")
-_POSITION = frozenset("t p pos position trans translation loc location".split())
-_QUATERNION = frozenset("q quat quaternion orientation rot rotation".split())
+_POSITION = frozenset(["t", "p", "pos", "position", "trans", "translation", "loc", "location"])
+_QUATERNION = frozenset(["q", "quat", "quaternion", "orientation", "rot", "rotation"])
 _OTHER = frozenset(
-    "v vel velocity twist linear angular a acc accel acceleration b bg ba bias w gyro omega "
-    "cov covariance sigma std euler rpy g gravity".split()
+    [
+        *("v", "vel", "velocity", "twist", "linear", "angular", "a", "acc", "accel", "acceleration", "w"),
+        *("gyro", "omega", "b", "bg", "ba", "bias", "cov", "covariance", "sigma", "std", "euler", "rpy"),
+        *("g", "gravity"),
+    ]
 )
 POSE = ("tx", "ty", "tz", "qw", "qx", "qy", "qz")
 

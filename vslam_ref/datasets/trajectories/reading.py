@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.text import Columns, FormatError, number
 from vslam_ref.datasets.trajectories import telling
 from vslam_ref.datasets.trajectories.formats import EUROC, KITTI, TUM, AsRead, TrajectoryFile, matrices
@@ -226,9 +226,9 @@ def _read_poses(rows: Rows, format: str) -> TrajectoryFile:
     trajectory = Trajectory(stamps.times[order], positions[order], R[order])
     ns = None if stamps.nanoseconds is None else stamps.nanoseconds[order]
     as_read = AsRead(values[order, 3:], ns)
-    places = np.array(kept)[order]
+    places, w_first = np.array(kept)[order], layout.pose[3] < layout.pose[4]
     return TrajectoryFile(
-        trajectory, format, as_read, unit_error, len(repeated), notes, places, len(rows.words)
+        trajectory, format, as_read, unit_error, len(repeated), notes, places, len(rows.words), w_first
     )
 
 
@@ -277,7 +277,8 @@ def _lost(words: list[str], columns: range | tuple[int, ...]) -> bool:
 def _numbers(rows: Rows, kept: list[int], columns: range | tuple[int, ...], names: tuple[str, ...]) -> Array:
     """Numbers of some lines and columns, all finite."""
     return np.array([
-        [number(rows.path, rows.lines[k], rows.words[k][c], name) for c, name in zip(columns, names, strict=True)]
+        [number(rows.path, rows.lines[k], rows.words[k][c], name)
+         for c, name in zip(columns, names, strict=True)]
         for k in kept
     ])  # fmt: skip
 

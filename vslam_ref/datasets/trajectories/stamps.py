@@ -93,7 +93,7 @@ def read_stamps(path: Path, lines: list[int], words: list[list[str]], usual: str
 
 
 def is_whole(word: str) -> bool:
-    """Whether a number of a file is whole: ``1403636580050000000``, ``1403636580050000000.000000``, ``5e8``."""
+    """Whether a number of a file is whole: ``1403636580050000000``, also with ``.000000``, ``5e8``."""
     try:
         value = float(word)
     except ValueError:

@@ -37,8 +37,8 @@ def lost(lines: Sequence[int], total: int) -> list[str]:
     """Lines without a pose."""
     if not lines:
         return []
-    what = f"{count(len(lines), 'line')} of {total} without a pose (nan, or a rotation of zeros; first: line {lines[0]})"
-    return [f"{what}: lost frames, left out"]
+    which = f"nan, or a rotation of zeros; first: line {lines[0]}"
+    return [f"{count(len(lines), 'line')} of {total} without a pose ({which}): lost frames, left out"]
 
 
 def falling(times: Array, lines: IntArray) -> list[str]:
@@ -78,11 +78,10 @@ def matrices(unit_error: float) -> list[str]:
 
 def passed_over(columns: int, first: int, names: tuple[str, ...]) -> str:
     """Columns that are not read, where no header says what they are."""
+    what, order = f"{columns} columns without names", ", ".join(names)
     if first == 0:
-        return (
-            f"{columns} columns without names: the first 8 are read as {', '.join(names)}, the others are not"
-        )
-    return f"{columns} columns without names: the first is taken for a number of the pose, then {', '.join(names)}"
+        return f"{what}: the first 8 are read as {order}, the others are not read"
+    return f"{what}: the first is taken for the number of the pose, the next 8 are read as {order}"
 
 
 def _times(number: int) -> str:
