@@ -49,6 +49,8 @@ ALIGNMENTS = ("none", "se3", "sim3")
 FORMATS = ("tum", "kitti", "euroc")
 MAX_DIFFERENCE = 0.01
 """Seconds; as in the library."""
+QUATERNION = {True: "qw qx qy qz", False: "qx qy qz qw"}
+"""Whether w is first -> the order of the numbers."""
 PLOTS = (".png", ".svg")
 ROWS = (
     ("pairs", "pairs of poses", ""),
@@ -162,33 +164,37 @@ def _notes(
     notes = [f"{name}: {note}" for name, file in zip(names, files, strict=True) for note in file.notes]
     notes += pairing_notes(estimate, truth, found.pairs, options.max_difference, options.offset)
     pairs = (estimate.take(found.pairs.estimate), found.truth)
-    notes += _order_notes(names, files, pairs)
+    notes += _order_notes(names, files, *pairs)
     if found.absolute.alignment.reason:
         notes.append(f"the alignment is one of many: {found.absolute.alignment.reason}")
     return notes
 
 
 def _order_notes(
-    names: tuple[str, str], files: list[TrajectoryFile], pairs: tuple[Trajectory, Trajectory]
+    names: tuple[str, str], files: list[TrajectoryFile], estimate: Trajectory, truth: Trajectory
 ) -> list[str]:
-    """Whether the quaternions of one file seem to stand in the other order."""
+    """Whether the quaternions of one file, or of both, seem to stand in the other order."""
     from vslam_ref.metrics.trajectory import judge_order
 
+    mine, theirs = (file.w_first for file in files)
     judged = []
-    for name, file, (suspect, trusted) in zip(names, files, (pairs, pairs[::-1]), strict=True):
-        if file.w_first is not None:
-            judged.append((judge_order(suspect, trusted, file.w_first), name, file.w_first))
-    judged = [one for one in judged if one[0].likely]
+    for asked in ((mine, None), (None, theirs), (mine, theirs)):
+        order = judge_order(estimate, truth, asked) if asked != (None, None) else None
+        if order is not None and order.likely:
+            judged.append((order, asked))
     if not judged:
         return []
-    order, name, w_first = min(judged, key=lambda one: one[0].other)
-    was, right = ("first", "qx qy qz qw") if w_first else ("last", "qw qx qy qz")
+    order, asked = min(judged, key=lambda one: one[0].other)
+    told = [_other_order(name, first) for name, first in zip(names, asked, strict=True) if first is not None]
     read, other = math.degrees(order.read), math.degrees(order.other)
-    return [
-        f"{name}: its quaternions were read with w {was}, but the rotations agree far better with the other "
-        f"file if w is {'last' if w_first else 'first'}: steps are then {other:.2g} degrees off instead of "
-        f"{read:.2g}; if so, put the line '# time tx ty tz {right}' above the poses"
-    ]
+    told[-1] += f"; then the rotations of the two files agree to {other:.2g} degrees, as read to {read:.2g}"
+    return told
+
+
+def _other_order(name: str, w_first: bool) -> str:
+    was, seems = ("first", "last") if w_first else ("last", "first")
+    told = f"{name}: its quaternions were read with w {was}, and w seems to be {seems}: if so, put the line"
+    return f"{told} '# time tx ty tz {QUATERNION[not w_first]}' above the poses"
 
 
 def _draw(path: Path, found: Evaluation, name: str, align: str) -> None:

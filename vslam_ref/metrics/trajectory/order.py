@@ -1,18 +1,23 @@
 r"""Whether the four numbers of a quaternion were read in the wrong order: w last that is first, or w first.
 
 Neither lengths nor positions show it.  Reading :math:`(x, y, z, w)` as :math:`(w, x, y, z)` is a permutation
-of the four, which keeps lengths *and* the angle of every step from one pose to the next; only its axis is
-wrong.  So the error of a step's rotation (RPE) is about as large as the step's rotation itself, and it nearly
-vanishes when the numbers are put in the other order.  That is the test, on steps long enough to turn:
+of the four, which keeps lengths and the angle from each pose to the next.  What it breaks is the tie between
+rotations and world: with the rotation :math:`R_A` that lays the estimated positions over the true ones,
 
-.. math:: e = \operatorname{rms}_k \angle\bigl(\Delta_k^T \hat\Delta_k\bigr), \qquad
-          e_\text{read} \ge \tfrac12 \operatorname{rms}_k \angle(\Delta_k), \qquad
-          e_\text{other} \le \tfrac14\, e_\text{read} .
+.. math:: X_k = R_k^T R_A \hat R_k
 
-A bad estimate in the right order does not pass: its errors have nothing in common with the permutation, and
-stay as large.  A path that does not turn has no :math:`\angle(\Delta_k)` to compare with.  An estimate of
-another body (a camera beside an IMU) turns about other axes by one rotation X; so the test is made once more
-with the X that fits each reading best, where the axes of the steps determine it.
+is the same for every pose k of a right file: 1, or how one body (a camera) is turned in the other (an IMU).
+In the wrong order it changes as much as the body turns.  How much the :math:`X_k` differ is told by the
+largest eigenvalue of the mean of :math:`x_k x_k^T`, with their quaternions :math:`x_k`: it is the mean of
+:math:`\cos^2(\theta_k/2)` over the angles from the best common rotation, so that
+
+.. math:: e = 2 \arcsin \sqrt{1 - \lambda_\text{max}}
+
+is, for small angles, their root mean square.  It is measured as the numbers were read and in the other order.
+The other order is likely where e as read is a fifth or more of what the body turns (e of its own rotations), at
+most a quarter of it is left, and inverse rotations (world in body) would not explain it better.  The errors
+of a bad estimate have nothing in common with the permutation: they stay as large in either order.  Positions
+that do not fit give no :math:`R_A` to rely on; then nothing is said.
 """
 
 from __future__ import annotations
@@ -22,44 +27,84 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.geometry import quaternion, so3
+from vslam_ref.geometry import quaternion
+from vslam_ref.geometry.alignment import align
 from vslam_ref.metrics.trajectory.poses import Trajectory
-from vslam_ref.metrics.trajectory.rpe import rotation_angle
 
-SHARE_OF_MOTION, SHARE_OF_ERROR = 0.5, 0.25
-ENOUGH_TURN = np.radians(15.0)
-"""Steps grow, up to a quarter of the path, until half of them turn by this."""
-LEAST_TURN = np.radians(0.5)
-"""Where the longest steps turn less, nothing is said."""
-LEAST_STEPS = 3
-LEAST_TO_FIT = 10
-"""Steps from which a rotation of the body may be fitted, too."""
+SHARE_OF_TURN, SHARE_OF_ERROR = 0.2, 0.25
+LEAST_TURN = np.radians(1.0)
+"""A body that turns less says nothing."""
+LEAST_POSES = 5
+MISFIT = 0.3
+"""Largest error of the aligned positions, as a share of the spread of the true ones."""
 
 
 class Order(NamedTuple):
-    """What the order of a quaternion's numbers was judged by; radians.
+    """What the order of quaternions' numbers was judged by; radians.
 
     Attributes
     ----------
     read, other : float
-        Root mean square error of the steps' rotations, as they were read and in the other order.
+        How much the body's turn between the two differs from pose to pose: as read, and in the other order.
     turn : float
-        Root mean square rotation of the true steps.
+        How much the body turns.
     likely : bool
         Whether the other order is the likely one.
-    fitted : bool
-        Whether a rotation of the body was fitted to both.
     """
 
     read: float
     other: float
     turn: float
     likely: bool
-    fitted: bool
+
+
+def judge_order(
+    estimate: Trajectory, truth: Trajectory, w_first: tuple[bool | None, bool | None]
+) -> Order | None:
+    """Judge whether the quaternions of one or both were read in the wrong order.
+
+    Parameters
+    ----------
+    estimate, truth : Trajectory
+        N poses each; pose k of one belongs to pose k of the other.
+    w_first : (bool or None, bool or None)
+        For each of the two: whether the first of four numbers was read as w, if its order is in question;
+        None if it is not.
+
+    Returns
+    -------
+    Order or None
+        None where the positions fix no rotation or do not fit, the body hardly turns, or there are fewer than
+        5 poses.
+    """
+    if len(truth) < LEAST_POSES:
+        return None
+    found = align(estimate.t_world_body, truth.t_world_body, with_scale=True)
+    as_read = (estimate.R_world_body, truth.R_world_body)
+    R, R_true = (
+        R if first is None else other_order(R, first) for R, first in zip(as_read, w_first, strict=True)
+    )
+    turn = max(spread(R), spread(R_true))
+    size = float(np.sqrt(truth.t_world_body.var(axis=0).sum()))
+    if found.reason or turn < LEAST_TURN or found.rmse > MISFIT * size:
+        return None
+    A = found.R_target_source
+    read, other = (_differ(A, *rotations) for rotations in (as_read, (R, R_true)))
+    inverse = min(_differ(A, _inverse(as_read[0]), as_read[1]), _differ(A, as_read[0], _inverse(as_read[1])))
+    left = min(SHARE_OF_ERROR * read, inverse)
+    return Order(read, other, turn, read >= SHARE_OF_TURN * turn and other <= left)
+
+
+def _differ(A: Array, R: Array, R_true: Array) -> float:
+    return spread(_inverse(R_true) @ A @ R)
+
+
+def _inverse(R: Array) -> Array:
+    return np.swapaxes(R, 1, 2)
 
 
 def other_order(R: Array, w_first: bool) -> Array:
-    """Rotations (N, 3, 3) as they are when the quaternions' numbers are taken in the other order.
+    """Rotations as they are when the numbers of their quaternions are taken in the other order.
 
     Parameters
     ----------
@@ -67,6 +112,10 @@ def other_order(R: Array, w_first: bool) -> Array:
         As they were read.
     w_first : bool
         Whether the first of the four was read as w.
+
+    Returns
+    -------
+    ndarray, shape (N, 3, 3)
 
     Examples
     --------
@@ -77,71 +126,24 @@ def other_order(R: Array, w_first: bool) -> Array:
     return quaternion.matrix(np.roll(quaternion.from_matrix(R), 1 if w_first else -1, axis=1))
 
 
-def judge_order(suspect: Trajectory, trusted: Trajectory, w_first: bool) -> Order:
-    """Judge whether the suspect's quaternions were read in the wrong order.
+def spread(R: Array) -> float:
+    """How much rotations differ, as the head of this module has it.
 
     Parameters
     ----------
-    suspect, trusted : Trajectory
-        N poses each; pose k of one belongs to pose k of the other.
-    w_first : bool
-        Whether the suspect's first of four was read as w.
+    R : ndarray, shape (N, 3, 3)
 
     Returns
     -------
-    Order
+    float
+        Radians: the root mean square angle from the best common rotation, where angles are small.
+
+    Examples
+    --------
+    >>> two = quaternion.matrix(quaternion.exp([[0.1, 0, 0], [-0.1, 0, 0]]))
+    >>> round(spread(two), 12)
+    0.1
     """
-    nothing = Order(0.0, 0.0, 0.0, False, False)
-    length, turn = _step_length(trusted)
-    if turn < LEAST_TURN or len(trusted) - length < LEAST_STEPS:
-        return nothing
-    true = _steps(trusted.R_world_body, length)
-    read = _steps(suspect.R_world_body, length)
-    other = _steps(other_order(suspect.R_world_body, w_first), length)
-    plain = _verdict(_rms(_between(true, read)), _rms(_between(true, other)), turn, False)
-    if plain.likely or len(true) < LEAST_TO_FIT:
-        return plain
-    fitted = [_fit_error(true, steps) for steps in (read, other)]
-    if None in fitted:
-        return plain
-    a, b = (float(e) for e in fitted if e is not None)
-    return _verdict(a, b, turn, True)
-
-
-def _verdict(read: float, other: float, turn: float, fitted: bool) -> Order:
-    likely = read >= SHARE_OF_MOTION * turn and other <= SHARE_OF_ERROR * read
-    return Order(read, other, turn, likely, fitted)
-
-
-def _steps(R: Array, length: int) -> Array:
-    """Rotations (N - length, 3, 3) from each pose to the one ``length`` later, in the body's frame."""
-    return np.swapaxes(R[:-length], 1, 2) @ R[length:]
-
-
-def _step_length(path: Trajectory) -> tuple[int, float]:
-    """Length of the steps, in poses, and how far they turn."""
-    length, turn = 1, 0.0
-    while length == 1 or length <= len(path) // 4:
-        turn = _rms(rotation_angle(_steps(path.R_world_body, length)))
-        if turn >= ENOUGH_TURN:
-            return length, turn
-        length *= 2
-    return length // 2, turn
-
-
-def _between(a: Array, b: Array) -> Array:
-    return rotation_angle(np.swapaxes(a, 1, 2) @ b)
-
-
-def _rms(angles: Array) -> float:
-    return float(np.sqrt(np.mean(angles**2)))
-
-
-def _fit_error(true: Array, steps: Array) -> float | None:
-    """Error that remains after the best turn X of the body, true = X steps X^T; None if X is not unique."""
-    mine, theirs = so3.log(steps), so3.log(true)
-    U, s, Vt = np.linalg.svd(theirs.T @ mine)
-    if s[1] < 0.05 * s[0]:
-        return None
-    X = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    return _rms(_between(true, X @ steps @ X.T))
+    q = quaternion.from_matrix(R)
+    largest = np.linalg.eigvalsh(q.T @ q / len(q))[-1]
+    return float(2 * np.arcsin(np.sqrt(max(0.0, 1.0 - largest))))
