@@ -187,7 +187,7 @@ def _order_notes(
     order, asked = min(judged, key=lambda one: one[0].other)
     told = [_other_order(name, first) for name, first in zip(names, asked, strict=True) if first is not None]
     read, other = math.degrees(order.read), math.degrees(order.other)
-    told[-1] += f"; then the rotations of the two files agree to {other:.2g} degrees, as read to {read:.2g}"
+    told[-1] += f"; the rotations of the two files then agree to {other:.2g} degrees, now to {read:.2g}"
     return told
 
 

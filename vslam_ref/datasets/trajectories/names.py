@@ -86,17 +86,17 @@ def layout(names: Sequence[str]) -> Layout | str:
     """
     found: dict[str, list[int]] = {}
     for k, name in enumerate(names):
-        found.setdefault(_role(name), []).append(k)
+        found.setdefault(role(name), []).append(k)
     times = [(k, *_stem(names[k])) for k in found.get("time", [])]
-    missing = [role for role in POSE if role not in found]
+    missing = [one for one in POSE if one not in found]
     if not times or missing:
         return f"no column {', '.join((['time'] if not times else []) + missing)}"
-    for role in POSE:
-        if len(found[role]) > 1:
-            a, b = (names[k] for k in found[role][:2])
-            return f"two columns could be {role}: {a} and {b}"
+    for one in POSE:
+        if len(found[one]) > 1:
+            a, b = (names[k] for k in found[one][:2])
+            return f"two columns could be {one}: {a} and {b}"
     which, unit = _time(times)
-    return Layout(which, tuple(found[role][0] for role in POSE), unit)
+    return Layout(which, tuple(found[one][0] for one in POSE), unit)
 
 
 def _time(times: list[tuple[int, str, str | None]]) -> tuple[tuple[int, ...], str | None]:
@@ -121,8 +121,14 @@ def _stem(name: str) -> tuple[str, str | None]:
     return "_".join(words), unit
 
 
-def _role(name: str) -> str:
-    """What a column is: "time", one of ``POSE``, or "" for anything else."""
+def role(name: str) -> str:
+    """Return what a column is: "time", one of ``POSE``, or "" for anything else.
+
+    Examples
+    --------
+    >>> [role(name) for name in ("p_RS_R_x [m]", "v_RS_R_x", "orientation.w", "stamp_ns")]
+    ['tx', '', 'qw', 'time']
+    """
     stem, _ = _stem(name)
     if _TIME.fullmatch(stem):
         return "time"

@@ -8,11 +8,12 @@ in a comment above the data.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
-from vslam_ref.datasets.text import FormatError, is_number, read_text
-from vslam_ref.datasets.trajectories.names import Layout, layout, split_header
+from vslam_ref.datasets.text import FormatError, decoded, is_number, read_bytes
+from vslam_ref.datasets.trajectories.names import Layout, layout, role, split_header
 
 COMMENTS = ("#", "%", "//")
 _LOST = re.compile(r"[-+]?(nan|inf|infinity)(\(.*\))?|[-+]?1\.#.*|n/?a|none|null|<na>|", re.IGNORECASE)
@@ -52,7 +53,7 @@ def read_rows(path: Path) -> Rows:
     FormatError
         If a line has more or fewer columns than the first, there is none, or a header names no pose.
     """
-    text = read_text(path)
+    text = _text(path)
     lines: list[int] = []
     kept: list[str] = []
     comments: list[str] = []
@@ -71,11 +72,22 @@ def read_rows(path: Path) -> Rows:
         if not pairs:
             raise FormatError(path, None, "no data below the header; expected one pose a line")
         first, lines, kept = lines[0], [n for n, _ in pairs], [line for _, line in pairs]
-        commas, words = _same_columns(path, lines, kept, len(names), text)
+        commas, words = _same_columns(path, lines, kept, text)
         header, notes = _named(path, first, names, len(words[0]))
         return Rows(path, words, lines, commas, header, notes)
-    commas, words = _same_columns(path, lines, kept, None, text)
+    commas, words = _same_columns(path, lines, kept, text)
     return Rows(path, words, lines, commas, _of_comments(comments, len(words[0])), ())
+
+
+def _text(path: Path) -> str:
+    """The text of a file: UTF-8, or the UTF-16 that Windows' shell writes."""
+    data = read_bytes(path)
+    if data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        return decoded(path, data)
+    try:
+        return data.decode("utf-16")
+    except UnicodeDecodeError:
+        raise FormatError(path, None, "not a text file; UTF-8 expected") from None
 
 
 def is_lost(word: str) -> bool:
@@ -98,41 +110,33 @@ def _split(line: str) -> tuple[bool, list[str]]:
     if "," not in line or (len(by_blanks) >= 8 and all(map(_DECIMAL_COMMA.fullmatch, by_blanks))):
         return False, [word.replace(",", ".") for word in by_blanks]
     words = [word.strip() for word in line.split(",")]
-    if any(" " in word or "\t" in word for word in words) and not any(
-        map(re.compile("[a-zA-Z]{4}").search, words)
-    ):
-        words = [part for word in words for part in word.split() or [""]]
-    return True, words
+    parts = [part for word in words for part in word.split() or [""]]
+    return True, parts if all(part == "" or is_number(part) for part in parts) else words
 
 
-def _same_columns(
-    path: Path, lines: list[int], kept: list[str], count: int | None, text: str
-) -> tuple[bool, list[list[str]]]:
-    """Words of all lines, as many in each as in the header or the first line; separators at the end go."""
-    commas, first = _split(kept[0])
-    if count is None:
-        while len(first) > 1 and first[-1] == "":
-            first.pop()
-        count = len(first)
-    elif len(first) == count + 1 and first[-1] != "" and not commas:
-        count += 1  # a table whose rows have a name that the header does not
+def _same_columns(path: Path, lines: list[int], kept: list[str], text: str) -> tuple[bool, list[list[str]]]:
+    """Words of all lines, as many in each as in most; separators at the end go."""
+    split = [_split(line) for line in kept]
+    count = Counter(_without_end(words) for _, words in split).most_common(1)[0][0]
     found = []
-    for number, line in zip(lines, kept, strict=True):
-        words = _split(line)[1]
+    for number, (_, words) in zip(lines, split, strict=True):
         if len(words) > count and not any(words[count:]):
             words = words[:count]
         if len(words) != count:
-            cut = number == lines[-1] and len(words) < count and not text.endswith(("\n", "\r"))
-            why = (
-                "; the file ends within this line, as of a program that was stopped: take it out"
-                if cut
-                else ""
-            )
-            raise FormatError(
-                path, number, f"{len(words)} columns; expected {count}, as in the first line{why}"
-            )
+            what = f"{len(words)} columns; expected {count}, as in the other lines"
+            if number == lines[-1] and len(words) < count and not text.endswith(("\n", "\r")):
+                what += "; the file ends within this line, as of a program that was stopped: take it out"
+            raise FormatError(path, number, what)
         found.append(words)
-    return commas, found
+    return split[0][0], found
+
+
+def _without_end(words: list[str]) -> int:
+    """How many words there are before separators that end the line."""
+    count = len(words)
+    while count > 1 and words[count - 1] == "":
+        count -= 1
+    return count
 
 
 def _is_header(names: list[str]) -> bool:
@@ -144,11 +148,12 @@ def _is_header(names: list[str]) -> bool:
 
 
 def _named(path: Path, line: int, names: list[str], count: int) -> tuple[Layout | None, tuple[str, ...]]:
-    """The layout that a header tells, or what to do without."""
+    """The layout that a header tells, or what to do without; R gives its column of row names no name."""
+    names = ["", *names] if len(names) == count - 1 else names
     found = layout(names) if len(names) == count else f"{len(names)} names for {count} columns"
     if isinstance(found, Layout):
         return found, ()
-    if any(isinstance(layout([*names, *more]), Layout) for more in (["time"], ["qw", "qx", "qy", "qz"])):
+    if len({role(name) for name in names} - {""}) > 3:
         right = "expected names of time, position and quaternion: time tx ty tz qx qy qz qw"
         raise FormatError(path, line, f"the header has {found}; {right}")
     told = (
@@ -158,10 +163,10 @@ def _named(path: Path, line: int, names: list[str], count: int) -> tuple[Layout 
 
 
 def _of_comments(comments: list[str], count: int) -> Layout | None:
-    """The layout that the last comment with as many names tells, if one does."""
+    """The layout that the last comment with names of the columns, or of the first of them, tells."""
     for text in reversed(comments):
         names = split_header(text)
-        found = layout(names) if len(names) == count else ""
+        found = layout(names) if len(names) <= count else ""
         if isinstance(found, Layout):
             return found
     return None

@@ -14,8 +14,8 @@ largest eigenvalue of the mean of :math:`x_k x_k^T`, with their quaternions :mat
 .. math:: e = 2 \arcsin \sqrt{1 - \lambda_\text{max}}
 
 is, for small angles, their root mean square.  It is measured as the numbers were read and in the other order.
-The other order is likely where e as read is a fifth or more of what the body turns (e of its own rotations), at
-most a quarter of it is left, and inverse rotations (world in body) would not explain it better.  The errors
+The other order is likely where e as read is a fifth or more of what the body turns (e of its own rotations),
+at most a quarter of it is left, and inverse rotations (world in body) do not explain it better.  The errors
 of a bad estimate have nothing in common with the permutation: they stay as large in either order.  Positions
 that do not fit give no :math:`R_A` to rely on; then nothing is said.
 """
