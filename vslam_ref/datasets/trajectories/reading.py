@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import Columns, FormatError, number
+from vslam_ref.datasets.text import Columns, FormatError, is_number, number
 from vslam_ref.datasets.trajectories import telling
 from vslam_ref.datasets.trajectories.formats import EUROC, KITTI, TUM, AsRead, TrajectoryFile, matrices
 from vslam_ref.datasets.trajectories.names import Layout
-from vslam_ref.datasets.trajectories.rows import Rows, is_lost, read_rows
+from vslam_ref.datasets.trajectories.rows import CUT, Rows, is_lost, read_rows
 from vslam_ref.datasets.trajectories.stamps import is_whole, read_stamps, unit_of
 from vslam_ref.metrics.trajectory.poses import Trajectory
 
@@ -104,7 +104,8 @@ def _format(rows: Rows) -> str:
             return "kitti"
         if count < len(TUM):
             right = "expected 8 (TUM), 12 (KITTI), or 8 with commas (EuRoC)"
-            raise FormatError(rows.path, rows.lines[0], f"{count} columns; {right}{_short(count)}")
+            why = _short(count) if is_number(rows.words[0][0]) else ""
+            raise FormatError(rows.path, rows.lines[0], f"{count} columns; {right}{why}")
     if not rows.commas or (rows.header is not None and len(rows.header.time) == 2):
         return "tum"
     column = rows.header.time[0] if rows.header else 0
@@ -179,7 +180,7 @@ def _columns(rows: Rows, format: str) -> _Chosen:
     if count in (WIDE if rows.commas else WIDE[:1]):
         return _Chosen(Layout((0,), pose), ())
     first = 0
-    for start in (0, 1):
+    for start in (0, 1) if is_whole(rows.words[0][0]) else (0,):
         values = _known(rows, tuple(k + start for k in pose))
         if values is not None and abs(_length(values[3:]) - 1) < UNIT_TOLERANCE:
             first = start
@@ -212,7 +213,7 @@ def _read_poses(rows: Rows, format: str) -> TrajectoryFile:
     key = stamps.times if stamps.nanoseconds is None else stamps.nanoseconds
     order = np.argsort(key, kind="stable")
     table = Columns(rows.path, values, np.array(lines))
-    positions, (R, unit_error) = _positions(table, (0, 1, 2)), _rotations(table, values[:, 3:])
+    positions, (R, unit_error) = _positions(table, (0, 1, 2)), _rotations(table, values[:, 3:], rows.cut)
     repeated = np.flatnonzero(np.diff(key[order]) == 0) + 1
     notes = (
         *rows.notes,
@@ -294,13 +295,19 @@ def _positions(table: Columns, columns: tuple[int, int, int]) -> Array:
     return positions
 
 
-def _rotations(table: Columns, q: Array) -> tuple[Array, float]:
-    """Rotation matrices (N, 3, 3) of quaternions wxyz (N, 4), and the worst length's distance from 1."""
+def _rotations(table: Columns, q: Array, cut: int) -> tuple[Array, float]:
+    """Rotation matrices (N, 3, 3) of quaternions wxyz (N, 4), and the worst length's distance from 1.
+
+    ``cut`` is the number of a line that the file's end may have cut, or 0.
+    """
     with np.errstate(over="ignore"):
         length = np.linalg.norm(q, axis=1)
     off = np.abs(length - 1.0)
     table.require(
         off <= UNIT_TOLERANCE,
-        lambda k: f"quaternion of length {length[k]:.6g}; expected 1 within {UNIT_TOLERANCE:g}",
+        lambda k: (
+            f"quaternion of length {length[k]:.6g}; expected 1 within {UNIT_TOLERANCE:g}"
+            f"{CUT if table.lines[k] == cut else ''}"
+        ),
     )
     return matrices(q), float(off.max())

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from vslam_ref.datasets.text import FormatError, decoded, is_number, read_bytes
 from vslam_ref.datasets.trajectories.names import Layout, layout, role, split_header
 
+CUT = "; the file ends within this line, as of a program that was stopped: take it out"
 COMMENTS = ("#", "%", "//")
 _LOST = re.compile(r"[-+]?(nan|inf|infinity)(\(.*\))?|[-+]?1\.#.*|n/?a|none|null|<na>|", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
@@ -35,6 +36,8 @@ class Rows(NamedTuple):
     header : Layout or None
         Where a pose stands, if names of the columns say so.
     notes : tuple of str
+    cut : int
+        Number of the last line if the file ends within it, without a line end; else 0.
     """
 
     path: Path
@@ -43,6 +46,7 @@ class Rows(NamedTuple):
     commas: bool
     header: Layout | None
     notes: tuple[str, ...]
+    cut: int
 
 
 def read_rows(path: Path) -> Rows:
@@ -66,17 +70,18 @@ def read_rows(path: Path) -> Rows:
             kept.append(line)
     if not kept:
         raise FormatError(path, None, "no data; expected one pose a line (TUM, KITTI or EuRoC)")
+    cut = 0 if text.endswith(("\n", "\r")) else lines[-1]
     names = split_header(kept[0])
     if _is_header(names):
         pairs = [(n, line) for n, line in zip(lines, kept, strict=True) if line != kept[0]]
         if not pairs:
             raise FormatError(path, None, "no data below the header; expected one pose a line")
         first, lines, kept = lines[0], [n for n, _ in pairs], [line for _, line in pairs]
-        commas, words = _same_columns(path, lines, kept, text)
+        commas, words = _same_columns(path, lines, kept, cut)
         header, notes = _named(path, first, names, len(words[0]))
-        return Rows(path, words, lines, commas, header, notes)
-    commas, words = _same_columns(path, lines, kept, text)
-    return Rows(path, words, lines, commas, _of_comments(comments, len(words[0])), ())
+        return Rows(path, words, lines, commas, header, notes, cut)
+    commas, words = _same_columns(path, lines, kept, cut)
+    return Rows(path, words, lines, commas, _of_comments(comments, len(words[0])), (), cut)
 
 
 def _text(path: Path) -> str:
@@ -114,7 +119,7 @@ def _split(line: str) -> tuple[bool, list[str]]:
     return True, parts if all(part == "" or is_number(part) for part in parts) else words
 
 
-def _same_columns(path: Path, lines: list[int], kept: list[str], text: str) -> tuple[bool, list[list[str]]]:
+def _same_columns(path: Path, lines: list[int], kept: list[str], cut: int) -> tuple[bool, list[list[str]]]:
     """Words of all lines, as many in each as in most; separators at the end go."""
     split = [_split(line) for line in kept]
     count = Counter(_without_end(words) for _, words in split).most_common(1)[0][0]
@@ -124,8 +129,7 @@ def _same_columns(path: Path, lines: list[int], kept: list[str], text: str) -> t
             words = words[:count]
         if len(words) != count:
             what = f"{len(words)} columns; expected {count}, as in the other lines"
-            if number == lines[-1] and len(words) < count and not text.endswith(("\n", "\r")):
-                what += "; the file ends within this line, as of a program that was stopped: take it out"
+            what += CUT if number == cut and len(words) < count else ""
             raise FormatError(path, number, what)
         found.append(words)
     return split[0][0], found

@@ -36,7 +36,7 @@ MOST = 9 * 10**18
 
 
 class Stamps(NamedTuple):
-    """Seconds (N,), whole nanoseconds (N,) where the file does not have seconds, and the unit."""
+    """Seconds (N,), whole nanoseconds (N,) where the file has them or can be read so, and the file's unit."""
 
     times: Array
     nanoseconds: IntArray | None
@@ -120,4 +120,4 @@ def _of_two(path: Path, lines: list[int], words: list[list[str]]) -> Stamps:
             )
         ns.append(_whole(path, line, a, whole, 9, "ns") + _whole(path, line, b, rest, 0, "ns"))
     exact = np.array(ns, dtype=np.int64)
-    return Stamps(seconds(exact), exact, "ns")
+    return Stamps(seconds(exact), exact, "s")

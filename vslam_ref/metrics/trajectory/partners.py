@@ -238,7 +238,8 @@ def no_pairs(
     assert truth.times is not None
     times = (estimate.times, truth.times)
     spans = [f"{t[0]:.3f} to {t[-1]:.3f} s" for t in times]
-    found = f"{len(pairs.truth)} pairs of poses within {max_difference:g} s: need {LEAST_PAIRS}"
+    count = "1 pair" if len(pairs.truth) == 1 else f"{len(pairs.truth)} pairs"
+    found = f"{count} of poses within {max_difference:g} s: need {LEAST_PAIRS}"
     return f"{found}; estimate {spans[0]}, truth {spans[1]}: {_why(estimate, truth, max_difference, offset)}"
 
 
@@ -247,7 +248,8 @@ def _why(estimate: Trajectory, truth: Trajectory, max_difference: float, offset:
         assert path.times is not None
         different = len(np.unique(path.times))
         if different < LEAST_PAIRS and len(path) >= LEAST_PAIRS:
-            return f"the {len(path)} poses of the {name} have {different} different times: were digits lost?"
+            what = f"the {len(path)} poses of the {name} have no more than {different} different times"
+            return f"{what}: were these written with too few digits?"
         if different < LEAST_PAIRS:
             return f"the {name} has too few poses"
     assert truth.times is not None
