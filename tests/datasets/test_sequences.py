@@ -220,7 +220,8 @@ def test_a_truth_of_a_part_is_told_and_one_can_be_given(tmp_path: Path) -> None:
         tmp_path, change=lambda f: f.update({"groundtruth_tum.txt": tum([0.05, 0.1, 0.15]).encode()})
     )
     sequence = open_sequence(folder)
-    assert sequence.notes == ("3 of 12 different times have a pose of the truth within 0.01 s",)
+    told = "9 of 12 pictures with different times (75 %) have no true pose within 0.01 s"
+    assert sequence.notes == (f"{told}: 1 before the truth begins; 8 after it ends",)
     given = tmp_path / "poses.txt"
     shutil.copy(put(tmp_path / "kitti", LAYOUTS["kitti"]()) / "poses.txt", given)
     other = open_sequence(folder, truth=given)

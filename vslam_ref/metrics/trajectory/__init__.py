@@ -10,6 +10,7 @@ module                        holds
 ``evaluation``                all of it for one pair of trajectories
 ``partners``                  which poses found no partner, and the likely reason
 ``clocks``                    the unit of time and the offset with which two trajectories would meet
+``hints``                     both in words
 ``order``                     whether quaternions were read with w in the wrong place
 ============================  =====================================================================
 
@@ -22,8 +23,8 @@ result.
 from vslam_ref.metrics.trajectory.association import MAX_DIFFERENCE, Pairs, associate
 from vslam_ref.metrics.trajectory.ate import MODES, AbsoluteError, absolute_error, pose_logarithms
 from vslam_ref.metrics.trajectory.evaluation import Evaluation, evaluate, pair_up
+from vslam_ref.metrics.trajectory.hints import no_pairs, pairing_notes
 from vslam_ref.metrics.trajectory.order import Order, judge_order
-from vslam_ref.metrics.trajectory.partners import no_pairs, pairing_notes
 from vslam_ref.metrics.trajectory.poses import Summary, Trajectory, summary
 from vslam_ref.metrics.trajectory.rpe import RelativeError, relative_error, rotation_angle
 

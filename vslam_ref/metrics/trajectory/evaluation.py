@@ -8,7 +8,7 @@ import numpy as np
 
 from vslam_ref.metrics.trajectory.association import MAX_DIFFERENCE, Pairs, associate
 from vslam_ref.metrics.trajectory.ate import LEAST_PAIRS, AbsoluteError, absolute_error
-from vslam_ref.metrics.trajectory.partners import no_pairs
+from vslam_ref.metrics.trajectory.hints import no_pairs
 from vslam_ref.metrics.trajectory.poses import Trajectory
 from vslam_ref.metrics.trajectory.rpe import RelativeError, relative_error
 

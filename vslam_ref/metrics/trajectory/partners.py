@@ -1,4 +1,4 @@
-"""Which poses found no partner, and the likely reason, in words that a reader of the numbers can act on.
+"""Which poses found no partner, and the likely reason.
 
 =============================  =========================================================================
 what is seen                   what is said
@@ -6,8 +6,7 @@ what is seen                   what is said
 before the truth, after it     the two overlap in part
 poses closer than the true     the rates differ: each true pose is used once
 between true poses             how far the nearest is; the ``--max-difference`` that would pair them
-far from a lonely true pose    the truth has gaps
-few pairs, or none             the unit of time, or the offset, with which they would meet
+far from any true pose         the truth has gaps
 =============================  =========================================================================
 """
 
@@ -20,18 +19,10 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.metrics.trajectory.association import Pairs
-from vslam_ref.metrics.trajectory.ate import LEAST_PAIRS
-from vslam_ref.metrics.trajectory.clocks import UNIT_NAMES, Meeting, meeting, nearest, shape_misfit
-from vslam_ref.metrics.trajectory.poses import Trajectory
+from vslam_ref.metrics.trajectory.clocks import nearest
 
-WORTH_ASKING = 0.05
-"""Share of poses left out from which another clock is looked for."""
-BETTER = 0.25
-"""Another clock is named beside pairs only if it leaves this share of their misfit, or doubles the pairs."""
 RATE = 0.75
 """The estimate's steps are this share of the truth's, or less: then the rates differ."""
-COVERED = 0.5
-"""Share of the truth's time below which it is said that the estimate covers a part only."""
 
 
 class LeftOut(NamedTuple):
@@ -109,61 +100,21 @@ def left_out(estimate: ArrayLike, truth: ArrayLike, pairs: Pairs, max_difference
         int(shared.sum()),
         float(np.median(some)) if len(some) else 0.0,
         float(some.max()) if len(some) else 0.0,
-        _median_step(a),
-        _median_step(b),
+        median_step(a),
+        median_step(b),
         float(max(overlap, 0.0) / (b[-1] - b[0])) if b[-1] > b[0] else 1.0,
     )
 
 
-def _median_step(times: Array) -> float:
-    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-
-
-def pairing_notes(
-    estimate: Trajectory, truth: Trajectory, pairs: Pairs, max_difference: float, offset: float = 0.0
-) -> list[str]:
-    """Tell how many poses found no partner, and why; nothing where there is nothing to tell.
+def median_step(times: Array) -> float:
+    """Return the median time from one to the next, seconds; 0 for one alone.
 
     Parameters
     ----------
-    estimate, truth : Trajectory
-        The estimate's times with the offset.
-    pairs : Pairs
-        Three or more.
-    max_difference : float
-        Seconds that were allowed.
-    offset : float
-        Seconds that were added to the estimate's times.
-
-    Returns
-    -------
-    list of str
-        A sentence each.
+    times : ndarray, shape (N,)
+        Seconds.
     """
-    if estimate.times is None or truth.times is None:
-        return []
-    out = left_out(estimate.times, truth.times, pairs, max_difference)
-    told = []
-    if out.total:
-        share = f"{out.total} of {out.poses} poses of the estimate ({percent(out.total, out.poses)})"
-        what = f"{share} have no true pose within {max_difference:g} s and are left out"
-        told.append(f"{what}: {'; '.join(reasons(out, max_difference))}")
-    if out.total > WORTH_ASKING * out.poses:
-        other = meeting(estimate, truth, max_difference)
-        if other is not None and _is_better(other, estimate, truth, pairs):
-            told.append(f"{words(other, offset)}; compare the errors with and without")
-    if out.covered < COVERED:
-        covered = percent(out.covered, 1)
-        told.append(f"the estimate covers {covered} of the truth's time: the errors are those of this part")
-    return told
-
-
-def _is_better(other: Meeting, estimate: Trajectory, truth: Trajectory, pairs: Pairs) -> bool:
-    """Whether another clock explains far more than the pairs at hand."""
-    if (other.factor, other.offset) == (1.0, 0.0) or other.pairs < len(pairs.truth):
-        return False
-    misfit = shape_misfit(estimate, truth, pairs)
-    return other.misfit <= BETTER * misfit or (other.pairs >= 2 * len(pairs.truth) and other.misfit <= misfit)
+    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def percent(part: float, whole: float) -> str:
@@ -182,14 +133,18 @@ def percent(part: float, whole: float) -> str:
     return f"{share:.1f} %" if share < 1 or share > 99 else f"{share:.0f} %"
 
 
-def reasons(out: LeftOut, max_difference: float) -> list[str]:
-    """Why poses found no partner, the commonest reason last.
+def reasons(out: LeftOut, max_difference: float, *, who: str = "estimate", options: bool = True) -> list[str]:
+    """Why poses found no partner.
 
     Parameters
     ----------
     out : LeftOut
     max_difference : float
         Seconds that were allowed.
+    who : str
+        What the estimate is called.
+    options : bool
+        Whether the reader can give ``--max-difference``.
     """
     told = [f"{out.before} before the truth begins"] * (out.before > 0)
     told += [f"{out.after} after it ends" if told else f"{out.after} after the truth ends"] * (out.after > 0)
@@ -197,97 +152,27 @@ def reasons(out: LeftOut, max_difference: float) -> list[str]:
         return told
     if out.step <= RATE * out.true_step:
         rates = f"one every {out.step:.3g} s, the truth one every {out.true_step:.3g} s"
-        why = f"as the estimate has more poses ({rates}) and each true one is used once"
+        why = f"as the {who} has more poses ({rates}) and each true one is used once"
         return [*told, f"{out.between + out.shared} {why}"]
     if out.shared:
         told.append(f"{out.shared} whose true pose has a nearer partner")
     if out.between and out.distance > max(out.true_step, max_difference):
         told.append(f"{out.between} in gaps of the truth, up to {out.farthest:.3g} s from its nearest pose")
     elif out.between:
-        limit = f"--max-difference {_rounded_up(out.farthest)}"
+        limit = f" (--max-difference {rounded_up(out.farthest)} would allow that)" if options else ""
         told.append(
-            f"{out.between} between true poses, {out.distance:.3g} s from the nearest in the median "
-            f"({limit} would allow that)"
+            f"{out.between} between true poses, {out.distance:.3g} s from the nearest in the median{limit}"
         )
     return told
 
 
-def _rounded_up(seconds: float) -> str:
-    """A limit of two digits that lets a difference pass."""
+def rounded_up(seconds: float) -> str:
+    """Return a limit of two digits that lets a difference in seconds pass.
+
+    Examples
+    --------
+    >>> rounded_up(0.0301), rounded_up(0.05)
+    ('0.031', '0.051')
+    """
     size = 10.0 ** np.floor(np.log10(seconds)) / 10
     return f"{np.ceil(seconds * (1 + 1e-6) / size) * size:.2g}"
-
-
-def no_pairs(
-    estimate: Trajectory, truth: Trajectory, pairs: Pairs, max_difference: float, offset: float = 0.0
-) -> str:
-    """Say why there are too few pairs, and the unit or the offset that would give more.
-
-    Parameters
-    ----------
-    estimate, truth : Trajectory
-        The estimate's times with the offset.
-    pairs : Pairs
-        Fewer than three.
-    max_difference : float
-        Seconds that were allowed.
-    offset : float
-        Seconds that were added to the estimate's times.
-    """
-    assert estimate.times is not None
-    assert truth.times is not None
-    times = (estimate.times, truth.times)
-    spans = [f"{t[0]:.3f} to {t[-1]:.3f} s" for t in times]
-    count = "1 pair" if len(pairs.truth) == 1 else f"{len(pairs.truth)} pairs"
-    found = f"{count} of poses within {max_difference:g} s: need {LEAST_PAIRS}"
-    return f"{found}; estimate {spans[0]}, truth {spans[1]}: {_why(estimate, truth, max_difference, offset)}"
-
-
-def _why(estimate: Trajectory, truth: Trajectory, max_difference: float, offset: float) -> str:
-    for name, path in (("estimate", estimate), ("truth", truth)):
-        assert path.times is not None
-        different = len(np.unique(path.times))
-        if different < LEAST_PAIRS and len(path) >= LEAST_PAIRS:
-            what = f"the {len(path)} poses of the {name} have no more than {different} different times"
-            return f"{what}: were these written with too few digits?"
-        if different < LEAST_PAIRS:
-            return f"the {name} has too few poses"
-    assert truth.times is not None
-    other = meeting(estimate, truth, max_difference)
-    if other is not None:
-        told = words(other, offset)
-        if other.factor == 1 and abs(other.offset) <= _median_step(truth.times):
-            told += f"; or, if the clocks are right, --max-difference {_rounded_up(abs(other.offset))}"
-        return told
-    return "no unit of time and no offset was found that makes them meet: are they of the same recording?"
-
-
-def words(other: Meeting, offset: float = 0.0) -> str:
-    """Name the unit, the offset, and what they would give.
-
-    Parameters
-    ----------
-    other : Meeting
-    offset : float
-        Seconds that were added to the estimate's times already.
-    """
-    gain = f"{other.pairs} of {other.poses} poses of the estimate find a true one"
-    if other.factor != 1:
-        which, factor = ("estimate", 1 / other.factor) if other.factor < 1 else ("truth", other.factor)
-        told = (
-            f"the times of the {which} look like {UNIT_NAMES[float(round(factor))]}: divided by {factor:.0f}"
-        )
-        return f"{told}{'' if other.offset == 0 else f', and with --offset {_short(other.offset)}'}, {gain}"
-    size, way = abs(other.offset), "behind" if other.offset > 0 else "ahead of"
-    clock = f"the estimate's clock seems {_short(size)} s{_hours(size)} {way} the truth's"
-    return f"{clock}: with --offset {_short(offset + other.offset)}, {gain}"
-
-
-def _short(seconds: float) -> str:
-    """Seconds with up to six decimals, without zeros at the end."""
-    return f"{seconds:.6f}".rstrip("0").rstrip(".")
-
-
-def _hours(seconds: float) -> str:
-    """Whole half hours in hours, as clocks of two zones differ."""
-    return f" ({seconds / 3600:g} h)" if seconds >= 1800 and seconds % 1800 == 0 and seconds < 1e5 else ""
