@@ -146,14 +146,14 @@ def test_files_without_times_are_compared_line_by_line(
 def test_what_a_reader_of_the_numbers_should_know_is_noted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = [f"{k / 8} {k} {2 * k} {-k} 0 0 0 0.9999" for k in range(2000)]
+    rows = [f"{k / 8} {k} {2 * k} {-k} 0 0 0 0.9995" for k in range(2000)]
     rows[700] = rows[699]
     path = tmp_path / "line.txt"
     path.write_text("\n".join(rows))
     assert run(path, path) == 0
     notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
-    assert any("1 pose(s) with the time of the pose before" in note for note in notes)
-    assert any("quaternion lengths up to 1.0e-04 off 1" in note for note in notes)
+    assert any("1 pose of 2000 with the time of an earlier line (first: line 701)" in note for note in notes)
+    assert any("quaternion lengths are up to 5.0e-04 off 1" in note for note in notes)
     assert any("one of many: the points lie on one line" in note for note in notes)
 
 
@@ -168,7 +168,7 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         out = capsys.readouterr().out
         assert re.search(r"^pairs of poses +40$", out, re.MULTILINE)
         assert re.search(r"^ATE, largest +0\.000000", out, re.MULTILINE)
-        assert "24 pose(s) with the time of the pose before; of equal times only the first is paired" in out
+        assert "24 poses of 64 with the time of an earlier line (first: line 3): the first pose of each" in out
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         (["E", "T", "--align", "SE3"], "invalid choice: 'SE3'"),
         (["E", "none.txt"], r"none\.txt: no such file"),
         (["E", "."], r"Is a directory|Permission denied"),
-        (["E", "T", "--format", "kitti"], r"estimate\.csv:2: 1 columns; expected 12"),
+        (["E", "T", "--format", "kitti"], r"estimate\.csv:2: 8 columns; expected 12"),
         (["E", "T", "--plot", "p.pdf"], r"p\.pdf.*must end in \.png or \.svg"),
         (["E", "T", "--plot", "gone/p.svg"], "folder .*gone.* does not exist: make it first"),
         (["E", "T", "--json", "gone/x.json"], "folder .*gone.* does not exist: make it first"),
@@ -187,7 +187,10 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         (["E", "few.txt"], "2 pairs of poses within"),
         (["E", "kitti.txt"], "the truth has no times and the other has"),
         (["E", "still.txt", "--align", "sim3"], "no scale can be found: the points of the target lie"),
-        (["E", "bad.txt"], r"bad\.txt:3: tx is 'nan'; expected a finite number"),
+        (["E", "bad.txt"], r"bad\.txt:3: tx is '1e999'; expected a finite number"),
+        (["E", "T", "--max-difference", "-1"], "'-1': expected seconds, 0 or more"),
+        (["E", "T", "--offset", "nan"], "'nan': expected seconds"),
+        (["kitti.txt", "kitti.txt", "--offset", "1"], "poses without times cannot be moved by 1 s"),
     ],
 )
 def test_bad_input_is_one_line_status_2_and_nothing_written(
@@ -205,7 +208,7 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(
     trajectories.write(tmp_path / "few.txt", truth.take(np.array([3, 4])), "tum")
     trajectories.write(tmp_path / "kitti.txt", truth, "kitti")
     trajectories.write(tmp_path / "still.txt", Trajectory(truth.times, 0 * t, R), "tum")
-    (tmp_path / "bad.txt").write_text("# t\n0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n")
+    (tmp_path / "bad.txt").write_text("# t\n0 0 0 0 0 0 0 1\n1 1e999 0 0 0 0 0 1\n")
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     places = {"E": files[0].name, "T": files[1].name}
