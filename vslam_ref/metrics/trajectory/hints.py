@@ -54,7 +54,7 @@ def pairing_notes(
     if out.total > WORTH_ASKING * out.poses:
         other = meeting(estimate, truth, max_difference)
         if other is not None and _is_better(other, estimate, truth, pairs):
-            told.append(f"{words(other, offset)}; compare the errors with and without")
+            return [*told, f"{words(other, offset)}; compare the errors with and without"]
     if out.covered < COVERED:
         covered = percent(out.covered, 1)
         told.append(f"the estimate covers {covered} of the truth's time: the errors are those of this part")
