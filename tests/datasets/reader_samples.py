@@ -158,6 +158,14 @@ EUROC = "#timestamp,px,py,pz,qw,qx,qy,qz\n" + "".join(
     f"{1403636580838555648 + k * 50000000},{k * 0.1:.3f},0.2,-3,{np.cos(k / 9):.9f},0,0,{np.sin(k / 9):.9f}\n"
     for k in range(8)
 )
+NAMED = "stamp_ms;x;y;z;qw;qx;qy;qz;quality\n" + "".join(
+    f"{1403636580838 + k * 50};{k * 0.1:.3f};0.2;-3;{np.cos(k / 9):.9f};0;0;{np.sin(k / 9):.9f};good\n"
+    for k in range(8)
+)
+VINS = "".join(
+    f"{1403636580838555648 + k * 50000000},{k},2,-3,{np.cos(k / 9):.5f},0,0,{np.sin(k / 9):.5f},1,0,0,\n"
+    for k in (0, 1, 3, 2, 4, 4, 5)
+)
 OPENCV = """%YAML:1.0
 ---
 image_width: 640
@@ -393,6 +401,8 @@ SAMPLES: dict[str, list[Sample]] = {
     "trajectories.reading:read": [
         Sample(_one("path.txt", TUM), check=trajectory_wrong),
         Sample(_one("path.csv", EUROC), check=trajectory_wrong),
+        Sample(_one("named.csv", NAMED), check=trajectory_wrong),
+        Sample(_one("vins.csv", VINS), check=trajectory_wrong),
     ],
     "trajectories.reading:detect": [Sample(_one("path.txt", TUM))],
     "trajectories.reading:read_tum": [Sample(_one("path.txt", TUM), check=trajectory_wrong)],
@@ -417,6 +427,8 @@ BLOCKS = {
     "text:read_bytes": "any bytes are right",
     "text:read_text": "any text is right",
     "text:read_lines": "any text is right",
-    "text:read_columns": "the readers of logs and trajectories use it",
+    "text:read_columns": "the readers of logs use it",
+    "trajectories.rows:read_rows": "answers with words that the readers of trajectories judge",
+    "trajectories.stamps:read_stamps": "is given words; the readers of trajectories use it",
 }
 """Readers that know no format: what they lack, and why they need no row."""

@@ -211,5 +211,5 @@ def test_paths_without_times_have_no_notes() -> None:
 
 def test_a_share_is_never_rounded_to_nothing_or_all() -> None:
     assert [percent(*s) for s in ((0, 5), (1, 5000), (1, 2), (4999, 5000), (5, 5))] == [
-        "0.0 %", "below 0.1 %", "50 %", "over 99.9 %", "100.0 %",
+        "0 %", "below 0.1 %", "50 %", "over 99.9 %", "100 %",
     ]  # fmt: skip

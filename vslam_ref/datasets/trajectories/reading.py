@@ -13,7 +13,7 @@ from vslam_ref.datasets.text import Columns, FormatError, is_number, number
 from vslam_ref.datasets.trajectories import telling
 from vslam_ref.datasets.trajectories.formats import EUROC, KITTI, TUM, AsRead, TrajectoryFile, matrices
 from vslam_ref.datasets.trajectories.names import Layout
-from vslam_ref.datasets.trajectories.rows import CUT, Rows, is_lost, read_rows
+from vslam_ref.datasets.trajectories.rows import CUT, WordTable, is_lost, read_rows
 from vslam_ref.datasets.trajectories.stamps import is_whole, read_stamps, unit_of
 from vslam_ref.metrics.trajectory.poses import Trajectory
 
@@ -96,7 +96,7 @@ def nanoseconds(path: Path, line: int, word: str) -> int:
 # --- which columns ---------------------------------------------------------------------------------
 
 
-def _format(rows: Rows) -> str:
+def _format(rows: WordTable) -> str:
     """Format of a table: by its header, else by the number of columns, then by separators and times."""
     if rows.header is None:
         count = len(rows.words[0])
@@ -129,7 +129,7 @@ def _short(count: int) -> str:
     return ""
 
 
-def _is_matrix(rows: Rows, count: int) -> bool:
+def _is_matrix(rows: WordTable, count: int) -> bool:
     """Whether the first line that can be read has a rotation's columns, and, of 16, the last row 0 0 0 1."""
     values = _known(rows, range(count))
     if values is None:
@@ -144,7 +144,7 @@ def _is_matrix(rows: Rows, count: int) -> bool:
         )
 
 
-def _known(rows: Rows, columns: range | tuple[int, ...]) -> Array | None:
+def _known(rows: WordTable, columns: range | tuple[int, ...]) -> Array | None:
     """The numbers in some columns of the first line in which all can be read."""
     for words in rows.words[:LOOKED_AT]:
         try:
@@ -168,7 +168,7 @@ class _Chosen(NamedTuple):
     notes: tuple[str, ...]
 
 
-def _columns(rows: Rows, format: str) -> _Chosen:
+def _columns(rows: WordTable, format: str) -> _Chosen:
     """Columns of a pose: those of the header, else the usual ones; one number more may stand before them."""
     if rows.header is not None:
         return _Chosen(rows.header, ())
@@ -192,7 +192,7 @@ def _columns(rows: Rows, format: str) -> _Chosen:
 # --- poses -----------------------------------------------------------------------------------------
 
 
-def _read_poses(rows: Rows, format: str) -> TrajectoryFile:
+def _read_poses(rows: WordTable, format: str) -> TrajectoryFile:
     """Poses with times: lost ones left out, in the order of time."""
     (layout, odd) = _columns(rows, format)
     kept = [k for k, words in enumerate(rows.words) if not _lost(words, layout.pose)]
@@ -233,7 +233,7 @@ def _read_poses(rows: Rows, format: str) -> TrajectoryFile:
     )
 
 
-def _read_kitti(rows: Rows) -> TrajectoryFile:
+def _read_kitti(rows: WordTable) -> TrajectoryFile:
     """Matrices, line by line."""
     count = len(rows.words[0])
     if count not in (12, 16) or (count == 16 and not _is_matrix(rows, count)):
@@ -275,7 +275,9 @@ def _lost(words: list[str], columns: range | tuple[int, ...]) -> bool:
     return all(re.fullmatch(r"[-+]?0*\.?0*([eE][-+]?\d+)?", words[k]) for k in rotation)
 
 
-def _numbers(rows: Rows, kept: list[int], columns: range | tuple[int, ...], names: tuple[str, ...]) -> Array:
+def _numbers(
+    rows: WordTable, kept: list[int], columns: range | tuple[int, ...], names: tuple[str, ...]
+) -> Array:
     """Numbers of some lines and columns, all finite."""
     return np.array([
         [number(rows.path, rows.lines[k], rows.words[k][c], name)

@@ -21,7 +21,7 @@ _LOST = re.compile(r"[-+]?(nan|inf|infinity)(\(.*\))?|[-+]?1\.#.*|n/?a|none|null
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
 
-class Rows(NamedTuple):
+class WordTable(NamedTuple):
     """Words of the lines that are neither empty nor comments.
 
     Attributes
@@ -49,7 +49,7 @@ class Rows(NamedTuple):
     cut: int
 
 
-def read_rows(path: Path) -> Rows:
+def read_rows(path: Path) -> WordTable:
     """Read the words of a table.
 
     Raises
@@ -79,9 +79,9 @@ def read_rows(path: Path) -> Rows:
         first, lines, kept = lines[0], [n for n, _ in pairs], [line for _, line in pairs]
         commas, words = _same_columns(path, lines, kept, cut)
         header, notes = _named(path, first, names, len(words[0]))
-        return Rows(path, words, lines, commas, header, notes, cut)
+        return WordTable(path, words, lines, commas, header, notes, cut)
     commas, words = _same_columns(path, lines, kept, cut)
-    return Rows(path, words, lines, commas, _of_comments(comments, len(words[0])), (), cut)
+    return WordTable(path, words, lines, commas, _of_comments(comments, len(words[0])), (), cut)
 
 
 def _text(path: Path) -> str:

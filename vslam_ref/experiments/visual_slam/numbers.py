@@ -84,7 +84,7 @@ def accuracy(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> Accur
     both = [(rows[int(a)], int(b)) for a, b in zip(*pairs, strict=True) if int(a) in rows]
     if len(both) < LEAST_THIRD:
         what = f"{len(both)} pictures have a pose and a true pose: need {LEAST_THIRD}"
-        return nothing._replace(reason=what + _clocks(sequence, numbers, T_cam_world))
+        return nothing._replace(reason=_clocks(sequence, numbers, T_cam_world) or what)
     mine, theirs = np.array(both).T
     estimate, truth = trajectory(None, T_cam_world[mine]), sequence.truth.take(theirs)
     truth = Trajectory(None, truth.t_world_body, truth.R_world_body)
@@ -108,7 +108,7 @@ def _clocks(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> str:
     pairs = associate(estimate.times, truth.times)
     if len(pairs.truth) >= LEAST_THIRD:
         return ""
-    return f"; {no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)}"
+    return no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)
 
 
 def document(run: Run, seconds: float) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def meeting(estimate: Trajectory, truth: Trajectory, max_difference: float) -> M
     estimate, truth : Trajectory
         With times.
     max_difference : float
-        Seconds between the two poses of a pair, at most.
+        Between the two poses of a pair, at most; seconds.
 
     Returns
     -------
@@ -174,9 +174,8 @@ def nearest(among: Array, times: Array) -> Array:
     Parameters
     ----------
     among : ndarray, shape (K,)
-        Seconds, rising.
+        In seconds, rising.
     times : ndarray, shape (N,)
-        Seconds.
 
     Returns
     -------
@@ -204,7 +203,7 @@ def speed_lag(estimate: Trajectory, truth: Trajectory) -> float | None:
     Returns
     -------
     float or None
-        Seconds to add to the estimate's times; None where the correlation stays below ``ALIKE``.
+        The seconds to add to the estimate's times; None where the correlation stays below ``ALIKE``.
 
     Notes
     -----

@@ -71,11 +71,11 @@ def left_out(estimate: ArrayLike, truth: ArrayLike, pairs: Pairs, max_difference
     Parameters
     ----------
     estimate, truth : array_like, shapes (N,), (K,)
-        Seconds, not falling.
+        In seconds, not falling.
     pairs : Pairs
         As :func:`.associate` found them.
     max_difference : float
-        Seconds that were allowed.
+        The seconds that were allowed.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def percent(part: float, whole: float) -> str:
         return "below 0.1 %"
     if 99.9 < share < 100:
         return "over 99.9 %"
-    return f"{share:.1f} %" if share < 1 or share > 99 else f"{share:.0f} %"
+    return f"{share:.1f} %" if 0 < share < 1 or 99 < share < 100 else f"{share:.0f} %"
 
 
 def reasons(out: LeftOut, max_difference: float, *, who: str = "estimate", options: bool = True) -> list[str]:
@@ -140,7 +140,7 @@ def reasons(out: LeftOut, max_difference: float, *, who: str = "estimate", optio
     ----------
     out : LeftOut
     max_difference : float
-        Seconds that were allowed.
+        The seconds that were allowed.
     who : str
         What the estimate is called.
     options : bool
