@@ -108,7 +108,9 @@ def _clocks(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> str:
     pairs = associate(estimate.times, truth.times)
     if len(pairs.truth) >= LEAST_THIRD:
         return ""
-    return no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)
+    told = no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)
+    falls = int((np.diff(sequence.times) < 0).sum())
+    return f"{told}; first mend the times of the pictures, which go back {falls} times" if falls else told
 
 
 def document(run: Run, seconds: float) -> dict[str, Any]:
