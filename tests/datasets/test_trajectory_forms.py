@@ -153,6 +153,12 @@ def test_times_that_begin_at_zero_keep_the_unit_of_the_format(tmp_path: Path) ->
     euroc = trajectories.read(put(tmp_path, text.replace(" ", ",").replace("0,0,0,1", "1,0,0,0")))
     assert euroc.trajectory.times is not None
     np.testing.assert_allclose(euroc.trajectory.times, 0.05 * np.arange(5), rtol=1e-15)
+    # 20 minutes after a machine's start; as milliseconds they would be of 2008, but half a day apart
+    text = "".join(f"{1_200_000_000_000 + 50_000_000 * k},{k},0,0,1,0,0,0\n" for k in range(5))
+    boot = trajectories.read(put(tmp_path, text))
+    assert (boot.format, boot.notes) == ("euroc", ())
+    assert boot.trajectory.times is not None
+    np.testing.assert_allclose(boot.trajectory.times, 1200 + 0.05 * np.arange(5), rtol=1e-15)
 
 
 def test_lines_out_of_order_are_sorted_and_told(tmp_path: Path) -> None:

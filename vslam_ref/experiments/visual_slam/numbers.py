@@ -110,7 +110,8 @@ def _clocks(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> str:
         return ""
     told = no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)
     falls = int((np.diff(sequence.times) < 0).sum())
-    return f"{told}; first mend the times of the pictures, which go back {falls} times" if falls else told
+    mend = f"; first mend the times of the pictures, which go back at {falls} of them"
+    return told + mend if falls else told
 
 
 def document(run: Run, seconds: float) -> dict[str, Any]:
