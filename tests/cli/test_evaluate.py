@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ import pytest
 from vslam_ref import _kernels, cli
 from vslam_ref.commands import evaluate as command
 from vslam_ref.datasets import catalogue, trajectories
-from vslam_ref.metrics.trajectory import MODES, Trajectory, evaluate
+from vslam_ref.geometry import so3
+from vslam_ref.metrics.trajectory import MAX_DIFFERENCE, MODES, Trajectory, evaluate
 from vslam_ref.plot import saving, style
 from vslam_ref.plot.trajectory import top_view, trajectory_figure
 
@@ -74,6 +76,7 @@ def test_the_choices_are_those_of_the_library() -> None:
     assert command.ALIGNMENTS == MODES
     assert command.FORMATS == trajectories.FORMATS
     assert tuple(f".{name}" for name in saving.FORMATS) == command.PLOTS
+    assert command.MAX_DIFFERENCE == MAX_DIFFERENCE
     assert [key for key, _, _ in command.ROWS] == KEYS
 
 
@@ -146,14 +149,14 @@ def test_files_without_times_are_compared_line_by_line(
 def test_what_a_reader_of_the_numbers_should_know_is_noted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = [f"{k / 8} {k} {2 * k} {-k} 0 0 0 0.9999" for k in range(2000)]
+    rows = [f"{k / 8} {k} {2 * k} {-k} 0 0 0 0.9995" for k in range(2000)]
     rows[700] = rows[699]
     path = tmp_path / "line.txt"
     path.write_text("\n".join(rows))
     assert run(path, path) == 0
     notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
-    assert any("1 pose(s) with the time of the pose before" in note for note in notes)
-    assert any("quaternion lengths up to 1.0e-04 off 1" in note for note in notes)
+    assert any("1 pose of 2000 with the time of an earlier line (first: line 701)" in note for note in notes)
+    assert any("quaternion lengths are up to 5.0e-04 off 1" in note for note in notes)
     assert any("one of many: the points lie on one line" in note for note in notes)
 
 
@@ -168,7 +171,9 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         out = capsys.readouterr().out
         assert re.search(r"^pairs of poses +40$", out, re.MULTILINE)
         assert re.search(r"^ATE, largest +0\.000000", out, re.MULTILINE)
-        assert "24 pose(s) with the time of the pose before; of equal times only the first is paired" in out
+        assert (
+            "24 poses of 64 with the time of an earlier line (first: line 3): the first pose of each" in out
+        )
 
 
 @pytest.mark.parametrize(
@@ -178,7 +183,7 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         (["E", "T", "--align", "SE3"], "invalid choice: 'SE3'"),
         (["E", "none.txt"], r"none\.txt: no such file"),
         (["E", "."], r"Is a directory|Permission denied"),
-        (["E", "T", "--format", "kitti"], r"estimate\.csv:2: 1 columns; expected 12"),
+        (["E", "T", "--format", "kitti"], r"estimate\.csv:2: 8 columns; expected 12"),
         (["E", "T", "--plot", "p.pdf"], r"p\.pdf.*must end in \.png or \.svg"),
         (["E", "T", "--plot", "gone/p.svg"], "folder .*gone.* does not exist: make it first"),
         (["E", "T", "--json", "gone/x.json"], "folder .*gone.* does not exist: make it first"),
@@ -187,7 +192,10 @@ def test_of_equal_times_only_the_first_is_paired(tmp_path: Path, capsys: pytest.
         (["E", "few.txt"], "2 pairs of poses within"),
         (["E", "kitti.txt"], "the truth has no times and the other has"),
         (["E", "still.txt", "--align", "sim3"], "no scale can be found: the points of the target lie"),
-        (["E", "bad.txt"], r"bad\.txt:3: tx is 'nan'; expected a finite number"),
+        (["E", "bad.txt"], r"bad\.txt:3: tx is '1e999'; expected a finite number"),
+        (["E", "T", "--max-difference", "-1"], "'-1': expected seconds, 0 or more"),
+        (["E", "T", "--offset", "nan"], "'nan': expected seconds"),
+        (["kitti.txt", "kitti.txt", "--offset", "1"], "poses without times cannot be moved by 1 s"),
     ],
 )
 def test_bad_input_is_one_line_status_2_and_nothing_written(
@@ -205,7 +213,7 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(
     trajectories.write(tmp_path / "few.txt", truth.take(np.array([3, 4])), "tum")
     trajectories.write(tmp_path / "kitti.txt", truth, "kitti")
     trajectories.write(tmp_path / "still.txt", Trajectory(truth.times, 0 * t, R), "tum")
-    (tmp_path / "bad.txt").write_text("# t\n0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n")
+    (tmp_path / "bad.txt").write_text("# t\n0 0 0 0 0 0 0 1\n1 1e999 0 0 0 0 0 1\n")
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     places = {"E": files[0].name, "T": files[1].name}
@@ -216,6 +224,122 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(
     assert error.count("\n") == 1
     assert out == ""
     assert sorted(tmp_path.iterdir()) == before
+
+
+def moving(n: int = 60) -> Trajectory:
+    """A body that moves and turns about all axes."""
+    a = np.linspace(0, 6, n)
+    t = np.stack([np.cos(a), np.sin(2 * a), 0.3 * a], axis=1)
+    R = so3.exp(np.stack([np.sin(a), 0.7 * a, np.cos(1.3 * a)], axis=1))
+    return Trajectory(1.4e9 + a, t, R)
+
+
+def answer(capsys: pytest.CaptureFixture[str], target: Path, *words: object) -> dict[str, Any]:
+    """The numbers that were written; their notes are those that were printed."""
+    assert run(*words, "--json", target) == 0
+    numbers: dict[str, Any] = json.loads(target.read_text())
+    shown = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
+    assert shown == [f"note: {note}" for note in numbers["notes"]]
+    return numbers
+
+
+def test_offset_and_limit_are_those_of_the_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The offset is added to the estimate's times; what is left over within the limit is paired."""
+    truth = moving()
+    trajectories.write(tmp_path / "t.txt", truth, "tum")
+    trajectories.write(tmp_path / "e.txt", truth.later(-2.5 + 0.03), "tum")
+    names, target = (tmp_path / "e.txt", tmp_path / "t.txt"), tmp_path / "n.json"
+    right = answer(capsys, target, *names, "--offset", "2.5", "--max-difference", "0.04")
+    assert (right["pairs"], right["notes"]) == (60, [])
+    assert right["ate_rmse"] < 1e-12
+    wrong = answer(capsys, target, *names, "--offset", "-2.5", "--max-difference", "0.04")  # the other way
+    assert wrong["pairs"] == 11  # 5 of 6 s are left out
+    assert "49 of 60 poses of the estimate (82 %) have no true pose within 0.04 s" in wrong["notes"][0]
+    assert "with --offset 2.47, 60 of 60 poses" in wrong["notes"][1]
+    assert run(*names, "--offset", "2.5") == 2
+    assert "with --offset 2.47, 60 of 60 poses" in capsys.readouterr().err
+    assert answer(capsys, target, *names, "--offset", "2.47")["pairs"] == 60
+    # of a limit above the step of the truth the nearest still counts
+    assert answer(capsys, target, *names, "--offset", "2.5", "--max-difference", "0.5")["ate_rmse"] < 1e-12
+
+
+def test_oddities_of_both_files_are_told_with_their_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = trajectories.to_text(moving(), "tum").splitlines()
+    lost = [*lines[:20], " ".join([lines[20].split()[0], *["nan"] * 7]), *lines[21:]]
+    (tmp_path / "e.txt").write_text("\n".join(lost))
+    (tmp_path / "t.txt").write_text("\n".join([*lines[:30], lines[31], lines[30], *lines[32:]]))
+    numbers = answer(capsys, tmp_path / "n.json", tmp_path / "e.txt", tmp_path / "t.txt")
+    assert numbers["pairs"] == 59
+    assert [note.partition(": ")[0] for note in numbers["notes"]] == [
+        str(tmp_path / n) for n in ("e.txt", "t.txt")
+    ]
+    assert "1 line of 60 without a pose" in numbers["notes"][0]
+    assert "the time goes back once (first: line 32" in numbers["notes"][1]
+
+
+def test_lost_lines_of_matrices_do_not_move_the_pairs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """KITTI's lines are pairs: a line that is lost in one file takes that line of the other with it."""
+    lines = trajectories.to_text(moving(), "kitti").splitlines()
+    nothing = " ".join(["nan"] * 12)
+    (tmp_path / "e.txt").write_text("\n".join([*lines[:7], nothing, *lines[8:]]))
+    (tmp_path / "t.txt").write_text("\n".join([*lines[:40], nothing, nothing, *lines[42:]]))
+    numbers = answer(capsys, tmp_path / "n.json", tmp_path / "e.txt", tmp_path / "t.txt")
+    assert numbers["pairs"] == 57
+    assert numbers["ate_max"] < 1e-12
+
+
+def with_w_first(path: Path, target: Path) -> Path:
+    rows = [line.split() for line in path.read_text().splitlines() if not line.startswith("#")]
+    target.write_text("\n".join(" ".join([*w[:4], w[7], *w[4:7]]) for w in rows))
+    return target
+
+
+def test_quaternions_with_w_first_are_named_and_the_remedy_works(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither the ATE nor the lengths show it; the note names the file, and the line that mends it."""
+    truth, target = moving(), tmp_path / "n.json"
+    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the two have different worlds
+    estimate = Trajectory(truth.times, truth.t_world_body @ turn.T, turn @ truth.R_world_body)
+    right = (tmp_path / "e.txt", tmp_path / "t.txt")
+    for path, name in ((estimate, right[0]), (truth, right[1])):
+        trajectories.write(name, path, "tum")
+    wrong = [with_w_first(name, tmp_path / f"wrong_{name.name}") for name in right]
+    good = answer(capsys, target, *right)
+    assert good["notes"] == []
+    for names, guilty in (
+        ((wrong[0], right[1]), wrong[:1]),
+        ((right[0], wrong[1]), wrong[1:]),
+        (wrong, wrong),
+    ):
+        numbers = answer(capsys, target, *names)
+        assert numbers["ate_rmse"] == good["ate_rmse"]
+        assert [note.partition(": ")[0] for note in numbers["notes"]] == [str(name) for name in guilty]
+        assert all("read with w last, and w seems to be first" in note for note in numbers["notes"])
+    (line,) = set(re.findall("'(# time .*?)'", " ".join(numbers["notes"])))
+    for name in wrong:
+        name.write_text(f"{line}\n{name.read_text()}")
+    assert answer(capsys, target, *wrong) == good
+
+
+def test_quaternions_with_w_last_in_a_table_of_nanoseconds_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """EuRoC's order is assumed without names; a table in the other order has the other note."""
+    path = moving()
+    trajectories.write(tmp_path / "t.txt", path, "tum")
+    trajectories.write(tmp_path / "e.csv", path, "euroc")
+    rows = [line.split(",") for line in (tmp_path / "e.csv").read_text().splitlines()[1:]]
+    (tmp_path / "e.csv").write_text("\n".join(",".join([*w[:4], *w[5:], w[4]]) for w in rows))
+    (note,) = answer(capsys, tmp_path / "n.json", tmp_path / "e.csv", tmp_path / "t.txt")["notes"]
+    assert "read with w first, and w seems to be last" in note
+    assert "'# time tx ty tz qx qy qz qw'" in note
 
 
 @pytest.mark.skipif(catalogue.find("trajectories") is None, reason="trajectories is not in VSLAM_REF_DATA")

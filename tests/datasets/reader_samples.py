@@ -22,7 +22,7 @@ import scipy.io
 from sequence_samples import CALIB, LAYOUTS, SIZE
 
 from vslam_ref.datasets.bundle_files import BundleFile
-from vslam_ref.datasets.trajectories import AsRead, TrajectoryFile
+from vslam_ref.datasets.trajectories import TrajectoryFile
 from vslam_ref.geometry.cameras import Camera
 
 
@@ -157,6 +157,14 @@ KITTI = "".join(
 EUROC = "#timestamp,px,py,pz,qw,qx,qy,qz\n" + "".join(
     f"{1403636580838555648 + k * 50000000},{k * 0.1:.3f},0.2,-3,{np.cos(k / 9):.9f},0,0,{np.sin(k / 9):.9f}\n"
     for k in range(8)
+)
+NAMED = "stamp_ms;x;y;z;qw;qx;qy;qz;quality\n" + "".join(
+    f"{1403636580838 + k * 50};{k * 0.1:.3f};0.2;-3;{np.cos(k / 9):.9f};0;0;{np.sin(k / 9):.9f};good\n"
+    for k in range(8)
+)
+VINS = "".join(
+    f"{1403636580838555648 + k * 50000000},{k},2,-3,{np.cos(k / 9):.5f},0,0,{np.sin(k / 9):.5f},1,0,0,\n"
+    for k in (0, 1, 3, 2, 4, 4, 5)
 )
 OPENCV = """%YAML:1.0
 ---
@@ -387,12 +395,14 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample(
             {"data.csv": EUROC.encode(), "sensor.yaml": SENSOR.encode()},
             lambda folder: (folder / "data.csv", folder / "sensor.yaml"),
-            check=lambda found: trajectory_wrong(TrajectoryFile(found, "euroc", AsRead(), 0.0, 0)),
+            check=trajectory_wrong,
         )
     ],
     "trajectories.reading:read": [
         Sample(_one("path.txt", TUM), check=trajectory_wrong),
         Sample(_one("path.csv", EUROC), check=trajectory_wrong),
+        Sample(_one("named.csv", NAMED), check=trajectory_wrong),
+        Sample(_one("vins.csv", VINS), check=trajectory_wrong),
     ],
     "trajectories.reading:detect": [Sample(_one("path.txt", TUM))],
     "trajectories.reading:read_tum": [Sample(_one("path.txt", TUM), check=trajectory_wrong)],
@@ -417,6 +427,8 @@ BLOCKS = {
     "text:read_bytes": "any bytes are right",
     "text:read_text": "any text is right",
     "text:read_lines": "any text is right",
-    "text:read_columns": "the readers of logs and trajectories use it",
+    "text:read_columns": "the readers of logs use it",
+    "trajectories.rows:read_rows": "answers with words that the readers of trajectories judge",
+    "trajectories.stamps:read_stamps": "is given words; the readers of trajectories use it",
 }
 """Readers that know no format: what they lack, and why they need no row."""

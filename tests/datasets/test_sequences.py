@@ -220,7 +220,8 @@ def test_a_truth_of_a_part_is_told_and_one_can_be_given(tmp_path: Path) -> None:
         tmp_path, change=lambda f: f.update({"groundtruth_tum.txt": tum([0.05, 0.1, 0.15]).encode()})
     )
     sequence = open_sequence(folder)
-    assert sequence.notes == ("3 of 12 different times have a pose of the truth within 0.01 s",)
+    told = "9 of 12 pictures with different times (75 %) have no true pose within 0.01 s"
+    assert sequence.notes == (f"{told}: 1 before the truth begins; 8 after it ends",)
     given = tmp_path / "poses.txt"
     shutil.copy(put(tmp_path / "kitti", LAYOUTS["kitti"]()) / "poses.txt", given)
     other = open_sequence(folder, truth=given)
@@ -234,6 +235,42 @@ def test_a_truth_of_a_part_is_told_and_one_can_be_given(tmp_path: Path) -> None:
     assert open_sequence(folder).truth is None
     with pytest.raises(ValueError, match="has no true trajectory"):
         open_sequence(folder).pairs()
+
+
+def test_what_is_odd_in_a_truth_reaches_the_notes(tmp_path: Path) -> None:
+    """A lost pose, lines out of order: in the truth beside the pictures, in a given one, of matrices."""
+    lines = tum([0.1 * k for k in range(COUNT)]).splitlines()
+    lost = " ".join([lines[3].split()[0], *["nan"] * 7])
+    odd = "\n".join([*lines[:3], lost, *lines[4:7], lines[8], lines[7], *lines[9:]])
+    folder = made(tmp_path, change=lambda f: f.update({"groundtruth_tum.txt": odd.encode()}))
+    given = tmp_path / "given.txt"
+    given.write_text(odd)
+    for options, name in (({}, "groundtruth_tum.txt"), ({"truth": given}, str(given))):
+        told = [note for note in open_sequence(folder, rate=10.0, **options).notes if note.startswith(name)]
+        assert [note.partition(": ")[2][:30] for note in told] == [
+            "1 line of 12 without a pose (n",
+            "the time goes back once (first",
+        ]
+    kitti = put(tmp_path / "kitti", LAYOUTS["kitti"]())
+    rows = (kitti / "poses.txt").read_text().splitlines()
+    (kitti / "poses.txt").write_text("\n".join([*rows[:5], " ".join(["nan"] * 12), *rows[6:]]))
+    for sequence in (open_sequence(kitti), open_sequence(folder, truth=kitti / "poses.txt")):
+        assert sequence.pairs().estimate.tolist() == [k for k in range(COUNT) if k != 5]
+        assert any("1 line of 12 without a pose" in note for note in sequence.notes)
+
+
+def test_a_wrong_rate_is_told_with_the_one_that_fits(tmp_path: Path) -> None:
+    folder = made(
+        tmp_path,
+        change=lambda f: (
+            f.pop("times.txt", None),
+            f.update({"groundtruth_tum.txt": tum([0.04 * k + 0.015 for k in range(COUNT)]).encode()}),
+        )[1],
+    )
+    note = open_sequence(folder, rate=10.0).notes[-1]
+    assert "the pictures last 1.1 s, the truth 0.44 s: they last as long with --rate 25" in note
+    assert "--rate" not in open_sequence(folder, rate=25.0).notes[-1]
+    assert "--max-difference" not in note  # which the command does not have
 
 
 # --- pictures that are none

@@ -168,28 +168,25 @@ def test_a_format_without_times_cannot_become_one_with(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("format", "line", "old", "new", "words"),
     [
-        ("tum", 3, "4 0 0 0 1", "4 0 0 0", "7 columns; expected 8: time, tx, ty, tz, qx, qy, qz, qw"),
+        ("tum", 3, "4 0 0 0 1", "4 0 0 0", "7 columns; expected 8, as in the other lines"),
         ("tum", 3, "4 0 0 0 1", "4 0 0 0 1 9", "9 columns; expected 8"),
-        ("tum", 3, "4 0 0 0 1", "nan 0 0 0 1", "tz is 'nan'; expected a finite number"),
+        ("tum", 3, "1.5 1", "nan 1", "time is 'nan'; expected a finite number"),
         ("tum", 3, "4 0 0 0 1", "1e999 0 0 0 1", "tz is '1e999'; expected a finite number"),
         ("tum", 3, "4 0 0 0 1", "x 0 0 0 1", "tz is 'x'; expected a number"),
         ("tum", 3, "4 0 0 0 1", "4e30 0 0 0 1", "tz is 4e+30 m; expected less than 1e+12"),
-        ("tum", 3, "4 0 0 0 1", "4 0 0 0 0", "quaternion of length 0; expected 1 within 0.001"),
+        ("tum", 3, "4 0 0 0 1", "4 0 0 0 1e-9", "quaternion of length 1e-09; expected 1 within 0.001"),
         ("tum", 3, "4 0 0 0 1", "4 0 0 0 1.01", "quaternion of length 1.01; expected 1 within 0.001"),
         ("tum", 3, "4 0 0 0 1", "4 1e300 0 0 1", "quaternion of length inf; expected 1"),
-        ("tum", 3, "1.5 1", "0.4 1", "time 0.400000000 s after 0.500000000 s; times must not go back"),
-        ("kitti", 2, "4", "4 5", "13 columns; expected 12: r11, r12"),
-        ("kitti", 2, "4", "inf", "tz is 'inf'; expected a finite number"),
+        ("kitti", 2, "4", "4 5", "13 columns; expected 12, as in the other lines"),
+        ("kitti", 2, "4", "1e999", "tz is '1e999'; expected a finite number"),
         ("kitti", 2, "0 1 4", "0 2 4", "not a rotation matrix (R^T R is 3 off the identity, or det R < 0)"),
         ("kitti", 2, "0 1 4", "0 -1 4", "not a rotation matrix (R^T R is 2 off"),
         ("kitti", 2, "1 0 0 1 0", "1 0 1e300 1 0", "not a rotation matrix"),
-        ("euroc", 3, "4, 1,0,0,0", "4, 1,0,0", "7 columns; expected 8: time [ns], tx"),
-        ("euroc", 3, "4, 1,0,0,0", "4, 1,0,0,", "qz is ''; expected a number"),
+        ("euroc", 3, "4, 1,0,0,0", "4, 1,0,0", "7 columns; expected 8, as in the other lines"),
         ("euroc", 3, "4, 1,0,0,0", "4, 0,0,0,0.5", "quaternion of length 0.5"),
         ("euroc", 3, "1500000000", "1.5", "time [ns] is '1.5'; expected whole nanoseconds below 9e18"),
         ("euroc", 3, "1500000000", "9" * 19, "expected whole nanoseconds below 9e18"),
-        ("euroc", 3, "1500000000", "499999999", "times must not go back"),
-        ("euroc", 1, "#timestamp", "timestamp", "time [ns] is 'timestamp [ns]'; expected whole nanoseconds"),
+        ("euroc", 1, "q_w,q_x", "roll,pitch", "expected names of time, position and quaternion"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_line(
@@ -197,7 +194,7 @@ def test_a_damaged_file_is_refused_with_its_line(
 ) -> None:
     lines = GOOD[format].splitlines()
     assert old in lines[line - 1]
-    lines[line - 1] = lines[line - 1].replace(old, new, 1)
+    lines[line - 1] = lines[line - 1].replace(old, new, 1).removeprefix("#" if line == 1 else "")
     path = put(tmp_path, "\n".join(lines))
     with pytest.raises(FormatError) as caught:
         trajectories.read(path, format)

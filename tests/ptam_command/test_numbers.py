@@ -84,6 +84,22 @@ def test_what_cannot_be_compared_says_why(numbers: np.ndarray, centres: np.ndarr
     assert what in got.reason
 
 
+def test_clocks_that_do_not_meet_are_told_as_by_evaluate() -> None:
+    """The offset that would make them meet, but no options that ``run ptam`` does not have."""
+    late = accuracy(sequence(0.1 * np.arange(N) + 7200.0), np.arange(N), poses(0.25 * CENTRES))
+    assert late.rmse is None
+    assert (
+        "0 pairs of poses within 0.01 s: need 3; estimate 7200.000 to 7202.900 s, truth 0.000 to"
+        in late.reason
+    )
+    assert "7200 s (2 h) ahead of the truth's: with -7200 s added to its times, 30 of 30 poses" in late.reason
+    assert "--" not in late.reason
+    times = 0.1 * np.arange(N) + 7200.0
+    times[20:] -= 1.55
+    fallen = accuracy(sequence(times), np.arange(N), poses(0.25 * CENTRES))
+    assert "first mend the times of the pictures, which go back at 1 of them" in fallen.reason
+
+
 def test_without_truth_there_is_nothing_and_no_reason() -> None:
     got = accuracy(sequence(truth=False), np.arange(N), poses(CENTRES))
     assert got.rmse is None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +19,7 @@ from vslam_ref.commands.options import (
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.trajectories import TrajectoryFile
-    from vslam_ref.metrics.trajectory import Evaluation
+    from vslam_ref.metrics.trajectory import Evaluation, Trajectory
 
 HELP = "compare an estimated trajectory with the true one: ATE and RPE"
 EPILOG = """\
@@ -26,21 +28,29 @@ alignment of the estimate before the absolute error (ATE) is measured:
   se3     best rotation and translation (the default)
   sim3    best rotation, translation and scale: for one camera, which does not know the scale
 
-Poses are paired by time: nearest, at most 0.01 s apart, each used once; KITTI files, which have no
-times, line by line. Of poses with equal times only the first is paired. The relative error (RPE) is that
-of the step from each pair to the next.
+Poses are paired by time: nearest, at most 0.01 s apart (--max-difference), each used once; KITTI files,
+which have no times, line by line. Of poses with equal times only the first is paired; lost frames (nan) are
+left out. The relative error (RPE) is that of the step from each pair to the next. What is odd in a file, how
+many poses found no partner and the likely reason are told in lines 'note: ...'.
 
 formats: tum (t tx ty tz qx qy qz qw), kitti (12 numbers), euroc (ns,tx,ty,tz,qw,qx,qy,qz); '.gz' is unpacked
+A header may name the columns in any order, as '# time tx ty tz qw qx qy qz'. Blanks, tabs, commas or
+semicolons part them; more columns than a pose has are passed over. Times since 1970 may be in seconds,
+milli-, micro- or nanoseconds.
 
 examples, after 'vslam-ref sample trajectory --out samples':
   vslam-ref evaluate samples/trajectory/estimate.txt samples/trajectory/groundtruth.txt --json errors.json
   vslam-ref evaluate samples/trajectory/estimate.txt samples/trajectory/groundtruth.txt --plot errors.svg
 and with your own:
-  vslam-ref evaluate keyframes.txt groundtruth.txt --align sim3"""
+  vslam-ref evaluate keyframes.txt groundtruth.txt --align sim3
+  vslam-ref evaluate estimate.txt groundtruth.txt --offset -7200 --max-difference 0.02"""
 
 ALIGNMENTS = ("none", "se3", "sim3")
 FORMATS = ("tum", "kitti", "euroc")
-FIRST = "of equal times only the first is paired"
+MAX_DIFFERENCE = 0.01
+"""Seconds; as in the library."""
+QUATERNION = {True: "qw qx qy qz", False: "qx qy qz qw"}
+"""Whether w is first -> the order of the numbers."""
 PLOTS = (".png", ".svg")
 ROWS = (
     ("pairs", "pairs of poses", ""),
@@ -65,6 +75,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=FORMATS, help="format of both files (default: seen from the text)"
     )
+    parser.add_argument(
+        "--max-difference",
+        type=_seconds(at_least_zero=True),
+        default=MAX_DIFFERENCE,
+        metavar="S",
+        help=f"seconds between the two poses of a pair, at most (default: {MAX_DIFFERENCE:g})",
+    )
+    parser.add_argument(
+        "--offset",
+        type=_seconds(),
+        default=0.0,
+        metavar="S",
+        help="seconds that are added to the times of the estimate (default: 0)",
+    )
     parser.add_argument("--plot", metavar="FILE", help="draw both paths and the error over time (.png, .svg)")
     add_json(parser)
 
@@ -78,15 +102,17 @@ def run(options: argparse.Namespace) -> int:
     from vslam_ref.datasets import trajectories
     from vslam_ref.metrics.trajectory import evaluate
 
-    estimate = trajectories.read(Path(options.estimate), options.format)
-    truth = trajectories.read(Path(options.truth), options.format)
-    found = evaluate(estimate.trajectory, truth.trajectory, options.align)
+    files = [trajectories.read(Path(name), options.format) for name in (options.estimate, options.truth)]
+    estimate, truth = _same_lines(*files)
+    limit, offset = options.max_difference, options.offset
+    found = evaluate(estimate, truth, options.align, max_difference=limit, offset=offset)
     numbers = found.numbers()
     print(f"{options.estimate} against {options.truth}, alignment {options.align}")
     rows = [[words, f"{numbers[key]:.6f}" if unit or key == "scale" else f"{numbers[key]}", unit]
             for key, words, unit in ROWS]  # fmt: skip
     print(table(["what", "value", "unit"], rows))
-    notes = print_notes(_notes(found, (options.estimate, estimate), (options.truth, truth)))
+    moved = estimate.later(offset) if offset else estimate
+    notes = print_notes(_notes(options, found, files, moved, truth))
     print_backend()
     write_json(target, {**numbers, "notes": notes})
     if plot is not None:
@@ -94,19 +120,81 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _notes(found: Evaluation, *read: tuple[str, TrajectoryFile]) -> list[str]:
+def _seconds(*, at_least_zero: bool = False) -> Callable[[str], float]:
+    """Return a reader of finite seconds."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or (at_least_zero and value < 0):
+            right = "seconds, 0 or more" if at_least_zero else "seconds"
+            raise argparse.ArgumentTypeError(f"{text!r}: expected {right}")
+        return value
+
+    return read
+
+
+def _same_lines(estimate: TrajectoryFile, truth: TrajectoryFile) -> tuple[Trajectory, Trajectory]:
+    """Both trajectories; without times only the lines that are no lost frame in either."""
+    paths = (estimate.trajectory, truth.trajectory)
+    if any(path.times is not None for path in paths) or estimate.lines != truth.lines:
+        return paths
+    import numpy as np
+
+    places = [file.places for file in (estimate, truth)]
+    assert places[0] is not None
+    assert places[1] is not None
+    _, mine, theirs = np.intersect1d(places[0], places[1], return_indices=True)
+    return paths[0].take(mine), paths[1].take(theirs)
+
+
+def _notes(
+    options: argparse.Namespace,
+    found: Evaluation,
+    files: list[TrajectoryFile],
+    estimate: Trajectory,
+    truth: Trajectory,
+) -> list[str]:
     """What a reader of the numbers should know."""
-    notes = []
-    for name, file in read:
-        if file.repeated:
-            notes.append(f"{name}: {file.repeated} pose(s) with the time of the pose before; {FIRST}")
-        if file.unit_error > 1e-6:
-            what = "R^T R" if file.format == "kitti" else "quaternion lengths"
-            did = "used as they are" if file.format == "kitti" else "normalised"
-            notes.append(f"{name}: {what} up to {file.unit_error:.1e} off 1, as rounded digits are; {did}")
+    from vslam_ref.metrics.trajectory import pairing_notes
+
+    names = (options.estimate, options.truth)
+    notes = [f"{name}: {note}" for name, file in zip(names, files, strict=True) for note in file.notes]
+    notes += pairing_notes(estimate, truth, found.pairs, options.max_difference, options.offset)
+    pairs = (estimate.take(found.pairs.estimate), found.truth)
+    notes += _order_notes(names, files, *pairs)
     if found.absolute.alignment.reason:
         notes.append(f"the alignment is one of many: {found.absolute.alignment.reason}")
     return notes
+
+
+def _order_notes(
+    names: tuple[str, str], files: list[TrajectoryFile], estimate: Trajectory, truth: Trajectory
+) -> list[str]:
+    """Whether the quaternions of one file, or of both, seem to stand in the other order."""
+    from vslam_ref.metrics.trajectory import judge_order
+
+    mine, theirs = (file.w_first for file in files)
+    judged = []
+    for asked in ((mine, None), (None, theirs), (mine, theirs)):
+        order = judge_order(estimate, truth, asked) if asked != (None, None) else None
+        if order is not None and order.likely:
+            judged.append((order, asked))
+    if not judged:
+        return []
+    order, asked = min(judged, key=lambda one: one[0].other)
+    told = [_other_order(name, first) for name, first in zip(names, asked, strict=True) if first is not None]
+    read, other = math.degrees(order.read), math.degrees(order.other)
+    told[-1] += f"; the rotations of the two files then agree to {other:.2g} degrees, now to {read:.2g}"
+    return told
+
+
+def _other_order(name: str, w_first: bool) -> str:
+    was, seems = ("first", "last") if w_first else ("last", "first")
+    told = f"{name}: its quaternions were read with w {was}, and w seems to be {seems}: if so, put the line"
+    return f"{told} '# time tx ty tz {QUATERNION[not w_first]}' above the poses"
 
 
 def _draw(path: Path, found: Evaluation, name: str, align: str) -> None:

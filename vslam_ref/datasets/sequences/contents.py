@@ -118,7 +118,9 @@ def _plain(folder: Path, pictures: Path) -> Contents:
     path = next((folder / name for name in TRUTHS if (folder / name).is_file()), None)
     if path is None:
         return Contents("plain", listed, times, _camera_beside(folder))
-    truth = trajectories.read_tum(path).trajectory
+    file = trajectories.read_tum(path)
+    truth = file.trajectory
+    notes += _told(file, path)
     if path.name == TRUTHS[1]:
         notes.append(f"{path.name} is COLMAP's reconstruction, not an independent truth")
     stamps, numbers = truth.times, None
@@ -133,15 +135,15 @@ def _kitti(folder: Path, name: str) -> Contents:
     listed, times = _with_times(listing.pictures_in(folder / name), folder / "times.txt")
     places = (folder / "poses.txt", folder.parent.parent / "poses" / f"{folder.name}.txt")
     path = next((place for place in places if place.is_file()), None)
-    truth = None if path is None else trajectories.read_kitti(path).trajectory
-    notes = (
-        () if truth is None or name == "image_0" else ("the poses are those of camera 0, beside this one",)
-    )
-    if path is not None and truth is not None and len(truth) != len(listed):
-        raise FormatError(path, None, f"{len(truth)} poses for {len(listed)} pictures; expected one for each")
-    numbers = None if truth is None else np.arange(len(listed))
-    place = "" if path is None else path.name
-    return Contents("kitti", listed, times, _camera_beside(folder), truth, numbers, place, notes)
+    if path is None:
+        return Contents("kitti", listed, times, _camera_beside(folder))
+    file = trajectories.read_kitti(path)
+    notes = [] if name == "image_0" else ["the poses are those of camera 0, beside this one"]
+    notes += _told(file, path)
+    if file.lines != len(listed):
+        raise FormatError(path, None, f"{file.lines} poses for {len(listed)} pictures; expected one for each")
+    camera = _camera_beside(folder)
+    return Contents("kitti", listed, times, camera, file.trajectory, file.places, path.name, tuple(notes))
 
 
 def _tum(folder: Path) -> Contents:
@@ -158,9 +160,12 @@ def _tum(folder: Path) -> Contents:
     if not listed:
         raise FormatError(path, None, "no picture; expected lines of time and name")
     truth = folder / "groundtruth.txt"
-    poses = trajectories.read_tum(truth).trajectory if truth.is_file() else None
-    place = truth.name if truth.is_file() else ""
-    return Contents("tum", tuple(listed), np.array(stamps), _camera_beside(folder), poses, None, place)
+    camera = _camera_beside(folder)
+    if not truth.is_file():
+        return Contents("tum", tuple(listed), np.array(stamps), camera)
+    file = trajectories.read_tum(truth)
+    notes = tuple(_told(file, truth))
+    return Contents("tum", tuple(listed), np.array(stamps), camera, file.trajectory, None, truth.name, notes)
 
 
 def _euroc(base: Path) -> Contents:
@@ -173,7 +178,14 @@ def _euroc(base: Path) -> Contents:
             "truth left out: it is the body's, and no sensor.yaml says where the camera is",
         ) * truth.is_file()
         return Contents("euroc", pictures, stamps, known, notes=notes)
-    return Contents("euroc", pictures, stamps, known, read_truth(truth, camera), None, "data.csv")
+    file = read_truth(truth, camera)
+    notes = tuple(_told(file, truth))
+    return Contents("euroc", pictures, stamps, known, file.trajectory, None, "data.csv", notes)
+
+
+def _told(file: trajectories.TrajectoryFile, path: Path) -> list[str]:
+    """What the reader of the truth noticed."""
+    return [f"{path.name}: {note}" for note in file.notes]
 
 
 def _seven_scenes(folder: Path) -> Contents:

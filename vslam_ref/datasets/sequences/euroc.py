@@ -43,7 +43,7 @@ def read_image_list(folder: Path) -> tuple[Array, tuple[Path, ...]]:
     return seconds(np.array(stamps, dtype=np.int64)), tuple(pictures)
 
 
-def read_truth(path: Path, sensor: Path) -> Trajectory:
+def read_truth(path: Path, sensor: Path) -> trajectories.TrajectoryFile:
     """Read the body's poses, and turn them into the camera's: T_world_cam = T_world_body T_body_cam.
 
     Raises
@@ -51,9 +51,10 @@ def read_truth(path: Path, sensor: Path) -> Trajectory:
     FormatError
         If one of the files is malformed.
     """
-    body = trajectories.read_euroc(path).trajectory
+    file = trajectories.read_euroc(path)
+    body = file.trajectory
     T_cam_body = read_euroc(sensor).T_cam_rig
     if T_cam_body is None:  # the reader demands it
         raise FormatError(sensor, None, "no T_BS; expected the body from the sensor")
     T = se3.from_rt(body.R_world_body, body.t_world_body) @ se3.inverse(T_cam_body)
-    return Trajectory(body.times, T[:, :3, 3], T[:, :3, :3])
+    return file._replace(trajectory=Trajectory(body.times, T[:, :3, 3], T[:, :3, :3]))

@@ -23,6 +23,7 @@ from vslam_ref.datasets.sequences.times import by_rate, odd, read_times
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.metrics.trajectory import MAX_DIFFERENCE, Trajectory, associate
+from vslam_ref.metrics.trajectory.partners import left_out, percent, reasons
 from vslam_ref.support.errors import InputError, suggestion
 from vslam_ref.worlds.rendered import NAMES
 
@@ -236,12 +237,13 @@ def _clock(count: int, own: Array | None, options: Wanted) -> tuple[Array, list[
 
 def _truth(options: Wanted, found: Contents, times: Array) -> tuple[Trajectory | None, str, list[str]]:
     """The true trajectory in the clock of the pictures, where it is from, and what is to be told."""
-    truth, numbers, place = found.truth, found.truth_numbers, found.truth_from
+    truth, numbers, place, told = found.truth, found.truth_numbers, found.truth_from, []
     if options.truth is not None:
-        truth, place = trajectories.read(options.truth).trajectory, str(options.truth)
-        numbers = np.arange(len(truth)) if truth.times is None else None
-        if numbers is not None and len(truth) != len(times):
-            what = f"{len(truth)} poses without times for {len(times)} pictures; expected one for each"
+        file, place = trajectories.read(options.truth), str(options.truth)
+        truth, told = file.trajectory, [f"{place}: {note}" for note in file.notes]
+        numbers = file.places if truth.times is None else None
+        if numbers is not None and file.lines != len(times):
+            what = f"{file.lines} poses without times for {len(times)} pictures; expected one for each"
             raise FormatError(options.truth, None, what)
     if truth is None:
         return None, "", []
@@ -249,9 +251,23 @@ def _truth(options: Wanted, found: Contents, times: Array) -> tuple[Trajectory |
     assert stamps is not None
     order = np.argsort(stamps, kind="stable")  # stamps of pictures may fall
     truth = Trajectory(stamps[order], truth.t_world_body[order], truth.R_world_body[order])
-    distinct = np.unique(times)
-    pairs = len(associate(distinct, stamps[order]).estimate)
-    if pairs == len(distinct):
-        return truth, place, []
-    near = f"a pose of the truth within {MAX_DIFFERENCE:g} s"
-    return truth, place, [f"{pairs} of {len(distinct)} different times have {near}"]
+    by_count = options.rate is not None or (found.times is None and options.times is None)
+    return truth, place, told + _unpaired(np.unique(times), stamps[order], by_count)
+
+
+def _unpaired(times: Array, stamps: Array, by_count: bool) -> list[str]:
+    """Pictures without a true pose, and the likely reason; ``by_count``: times come from a rate."""
+    out = left_out(times, stamps, associate(times, stamps), MAX_DIFFERENCE)
+    if not out.total:
+        return []
+    why = reasons(out, MAX_DIFFERENCE, who="sequence", options=False)
+    what = (
+        f"{out.total} of {out.poses} pictures with different times ({percent(out.total, out.poses)}) have no"
+    )
+    told = f"{what} true pose within {MAX_DIFFERENCE:g} s: {'; '.join(why)}"
+    spans = [float(clock[-1] - clock[0]) for clock in (times, stamps)]
+    if by_count and min(spans) > 0 and abs(spans[0] / spans[1] - 1) > 0.01:
+        rate = (len(times) - 1) / spans[1]
+        lasts = f"the pictures last {spans[0]:.4g} s, the truth {spans[1]:.4g} s"
+        told += f"; {lasts}: they last as long with --rate {rate:.4g}"
+    return [told]

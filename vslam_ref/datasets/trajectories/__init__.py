@@ -6,10 +6,24 @@ format   one line is
 tum      ``time tx ty tz qx qy qz qw``: seconds, metres, unit quaternion with w **last**
 kitti    ``r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz``: the upper three rows of the matrix; no time
 euroc    ``time,tx,ty,tz,qw,qx,qy,qz``: **nanoseconds** (whole), metres, quaternion with w **first**;
-         nine more columns (velocity and biases) may follow and are not read
+         velocity (VINS), and biases (EuRoC), may follow and are not read
 =======  ==============================================================================================
 
-All three are read as ``T_world_body``.  ``#`` begins a comment, ``.gz`` is unpacked.
+All three are read as ``T_world_body``.  ``#``, ``%`` and ``//`` begin a comment, ``.gz`` is unpacked.
+
+*What programs write is read.*  Blanks, tabs, commas or semicolons part the columns, also at the end of a
+line.  Names of the columns, in the first line or in a comment above the data, say what they are, in which
+order and unit; without names, times since 1970 tell their unit by their size.
+
+====================================  =================================================================
+what is odd                           what is done, and told in ``notes``
+====================================  =================================================================
+lines out of order                    the poses are put in the order of time
+several poses of one time             of equal times only the first is paired with another trajectory
+``nan``, or zeros for a quaternion    lost frames: left out (as by TUM's own program)
+times in milli-, micro-, nanoseconds  read as such
+columns that nothing names            passed over, if the length of the quaternion shows the others
+====================================  =================================================================
 
 *Nothing is lost.*  Numbers are written with the fewest digits that read back as the same double.  Two
 things of a file are not part of a :class:`~vslam_ref.metrics.trajectory.poses.Trajectory`: quaternions as
@@ -18,9 +32,8 @@ quaternions), and whole nanoseconds (a double holds seconds since 1970 to 2.4e-7
 them, and :func:`write` gives them back.
 
 *Nothing wrong gets in.*  A quaternion whose length, or a matrix whose R^T R, is off by more than
-``UNIT_TOLERANCE`` is refused, and so is a time that goes back.  A time may stand several times (a recorder's
-hiccup: the true poses of the TUM set fr2/desk have one such line, a phone's clip began with 24); these lines
-are counted, and of equal times only the first is paired with another trajectory.
+``UNIT_TOLERANCE`` is refused, and so is a line with more or fewer columns than the others: the last one too,
+if a program was stopped while it wrote it.
 """
 
 from vslam_ref.datasets.trajectories.formats import FORMATS, AsRead, TrajectoryFile

@@ -15,7 +15,6 @@ FORMATS = ("tum", "kitti", "euroc")
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 KITTI = ("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz")
 EUROC = ("time [ns]", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
-EUROC_EXTRA = ("vx", "vy", "vz", "bwx", "bwy", "bwz", "bax", "bay", "baz")
 
 
 class AsRead(NamedTuple):
@@ -38,6 +37,7 @@ class TrajectoryFile(NamedTuple):
     Attributes
     ----------
     trajectory : Trajectory
+        In the order of time.
     format : str
         "tum", "kitti" or "euroc".
     as_read : AsRead
@@ -45,7 +45,15 @@ class TrajectoryFile(NamedTuple):
     unit_error : float
         How far the worst quaternion's length is from 1, or the worst entry of R^T R from the identity.
     repeated : int
-        Lines with the time of the line above.
+        Poses with the time of an earlier line.
+    notes : tuple of str
+        What is odd in the file and harmless, a sentence each.
+    places : ndarray of int, shape (N,), or None
+        Which line of poses of the file, from 0, each pose is; lost frames are left out.
+    lines : int
+        How many lines of poses the file has.
+    w_first : bool or None
+        Whether the first number of each quaternion was read as w; None for matrices.
     """
 
     trajectory: Trajectory
@@ -53,6 +61,10 @@ class TrajectoryFile(NamedTuple):
     as_read: AsRead
     unit_error: float
     repeated: int
+    notes: tuple[str, ...] = ()
+    places: IntArray | None = None
+    lines: int = 0
+    w_first: bool | None = None
 
 
 def seconds(ns: IntArray) -> Array:

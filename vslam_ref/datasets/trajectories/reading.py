@@ -1,24 +1,20 @@
-"""Readers of trajectories; every malformation is one line with file and line number."""
+"""Readers of trajectories; every malformation is one line with file and line number, every oddity a note."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
-from vslam_ref.datasets.text import Columns, FormatError, number, read_columns, read_lines
-from vslam_ref.datasets.trajectories.formats import (
-    EUROC,
-    EUROC_EXTRA,
-    KITTI,
-    TUM,
-    AsRead,
-    TrajectoryFile,
-    matrices,
-    seconds,
-)
+from vslam_ref.arrays import Array
+from vslam_ref.datasets.text import Columns, FormatError, is_number, number
+from vslam_ref.datasets.trajectories import telling
+from vslam_ref.datasets.trajectories.formats import EUROC, KITTI, TUM, AsRead, TrajectoryFile, matrices
+from vslam_ref.datasets.trajectories.names import Layout
+from vslam_ref.datasets.trajectories.rows import CUT, WordTable, is_lost, read_rows
+from vslam_ref.datasets.trajectories.stamps import is_whole, read_stamps, unit_of
 from vslam_ref.metrics.trajectory.poses import Trajectory
 
 UNIT_TOLERANCE = 1e-3
@@ -26,6 +22,13 @@ UNIT_TOLERANCE = 1e-3
 
 LONGEST = 1e12
 """Metres; a position must be smaller (the solar system is)."""
+
+WIDE = (8, 11, 17)
+"""Columns of known files with commas: pose; with velocity (VINS); with velocity and biases (EuRoC)."""
+ORDERS = {"tum": (1, 2, 3, 7, 4, 5, 6), "euroc": (1, 2, 3, 4, 5, 6, 7)}
+"""Columns of tx, ty, tz, qw, qx, qy, qz."""
+LOOKED_AT = 50
+"""Lines that are looked at to see what the columns are."""
 
 
 def read(path: Path, format: str | None = None) -> TrajectoryFile:
@@ -36,7 +39,8 @@ def read(path: Path, format: str | None = None) -> TrajectoryFile:
     path : Path
         Plain text or ``.gz``.
     format : {"tum", "kitti", "euroc"}, optional
-        By default found from the first line: commas are EuRoC, 8 columns TUM, 12 KITTI.
+        By default found from the first line: 12 columns are KITTI; else commas and whole nanoseconds EuRoC,
+        anything else TUM.
 
     Raises
     ------
@@ -45,85 +49,37 @@ def read(path: Path, format: str | None = None) -> TrajectoryFile:
     ValueError
         If there is no such format.
     """
-    chosen = detect(path) if format is None else format
-    if chosen not in READERS:
-        raise ValueError(f"trajectory format {chosen!r}: need one of {', '.join(READERS)}")
-    return READERS[chosen](path)
+    if format is not None and format not in READERS:
+        raise ValueError(f"trajectory format {format!r}: need one of {', '.join(READERS)}")
+    rows = read_rows(path)
+    chosen = _format(rows) if format is None else format
+    return _read_kitti(rows) if chosen == "kitti" else _read_poses(rows, chosen)
 
 
 def detect(path: Path) -> str:
-    """Find the format from the first line that is not a comment.
+    """Find the format from the columns and the times.
 
     Raises
     ------
     FormatError
-        If it fits no format, or there is no such line.
+        If it fits no format, or there is no data.
     """
-    for line, text in read_lines(path):
-        if "," in text:
-            return "euroc"
-        columns = len(text.split())
-        for name, names in (("tum", TUM), ("kitti", KITTI)):
-            if columns == len(names):
-                return name
-        right = "expected 8 (TUM), 12 (KITTI), or 8 with commas (EuRoC)"
-        raise FormatError(path, line, f"{columns} columns; {right}")
-    raise FormatError(path, None, "no data; expected one pose a line (TUM, KITTI or EuRoC)")
+    return _format(read_rows(path))
 
 
 def read_tum(path: Path) -> TrajectoryFile:
-    """Read ``time tx ty tz qx qy qz qw``; see :func:`read`."""
-    table = read_columns(path, TUM)
-    repeated = _require_times(table)
-    q = table.values[:, [7, 4, 5, 6]]
-    R, unit_error = _rotations(table, q)
-    trajectory = Trajectory(table.values[:, 0], _positions(table, (1, 2, 3)), R)
-    return TrajectoryFile(trajectory, "tum", AsRead(q), unit_error, repeated)
+    """Read ``time tx ty tz qx qy qz qw``, or the order that a header tells; see :func:`read`."""
+    return _read_poses(read_rows(path), "tum")
 
 
 def read_kitti(path: Path) -> TrajectoryFile:
     """Read twelve numbers a line; see :func:`read`.  The matrices stay as they stand there."""
-    table = read_columns(path, KITTI)
-    R = table.values.reshape(-1, 3, 4)[:, :, :3].copy()
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not a rotation either
-        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max((1, 2))
-        off[np.linalg.det(R) < 0] = 2.0  # a mirror
-    table.require(
-        off <= UNIT_TOLERANCE,
-        lambda k: (
-            f"not a rotation matrix (R^T R is {off[k]:.3g} off the identity, or det R < 0); "
-            "expected 12 numbers of one pose, row by row"
-        ),
-    )
-    trajectory = Trajectory(None, _positions(table, (3, 7, 11)), R)
-    return TrajectoryFile(trajectory, "kitti", AsRead(), float(off.max()), 0)
+    return _read_kitti(read_rows(path))
 
 
 def read_euroc(path: Path) -> TrajectoryFile:
     """Read ``time,tx,ty,tz,qw,qx,qy,qz`` with whole nanoseconds; see :func:`read`."""
-    stamps: list[int] = []
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    for line, text in read_lines(path):
-        words = [word.strip() for word in text.split(",")]
-        names = EUROC if len(words) == len(EUROC) else EUROC + EUROC_EXTRA
-        if len(words) != len(names):
-            what = f"{len(words)} columns; expected 8: {', '.join(EUROC)} (or these and 9 more)"
-            raise FormatError(path, line, what)
-        stamps.append(nanoseconds(path, line, words[0]))
-        values = [number(path, line, word, name) for word, name in zip(words[1:], names[1:], strict=True)]
-        rows.append([0.0, *values[:7]])
-        lines.append(line)
-    if not rows:
-        raise FormatError(path, None, f"no data; expected lines of {','.join(EUROC)}")
-    ns = np.array(stamps, dtype=np.int64)
-    table = Columns(path, np.array(rows), np.array(lines))
-    table.values[:, 0] = seconds(ns)
-    repeated = _require_times(table, ns)
-    q = table.values[:, 4:8].copy()
-    R, unit_error = _rotations(table, q)
-    trajectory = Trajectory(table.values[:, 0], _positions(table, (1, 2, 3)), R)
-    return TrajectoryFile(trajectory, "euroc", AsRead(q, ns), unit_error, repeated)
+    return _read_poses(read_rows(path), "euroc")
 
 
 READERS = {"tum": read_tum, "kitti": read_kitti, "euroc": read_euroc}
@@ -137,6 +93,199 @@ def nanoseconds(path: Path, line: int, word: str) -> int:
     return int(word)
 
 
+# --- which columns ---------------------------------------------------------------------------------
+
+
+def _format(rows: WordTable) -> str:
+    """Format of a table: by its header, else by the number of columns, then by separators and times."""
+    if rows.header is None:
+        count = len(rows.words[0])
+        if count in (12, 16) and _is_matrix(rows, count):
+            return "kitti"
+        if count < len(TUM):
+            right = "expected 8 (TUM), 12 (KITTI), or 8 with commas (EuRoC)"
+            why = _short(count) if is_number(rows.words[0][0]) else ""
+            raise FormatError(rows.path, rows.lines[0], f"{count} columns; {right}{why}")
+    if not rows.commas or (rows.header is not None and len(rows.header.time) == 2):
+        return "tum"
+    column = rows.header.time[0] if rows.header else 0
+    words = [row[column] for row in rows.words]
+    if not all(map(is_whole, words[:LOOKED_AT])):
+        usual = "s"
+    else:
+        usual = "ns"
+    stated = rows.header.unit if rows.header else None
+    known = [float(word) for word in words if is_whole(word)]
+    unit = stated or (unit_of(np.array(known), usual) if known else usual)
+    return "euroc" if unit == "ns" else "tum"
+
+
+def _short(count: int) -> str:
+    """What may be wrong with a line of few columns."""
+    if count == 7:
+        return "; is the time missing?"
+    if count in (3, 4):
+        return "; positions alone are no poses: add 0 0 0 1 where the rotation is not known"
+    return ""
+
+
+def _is_matrix(rows: WordTable, count: int) -> bool:
+    """Whether the first line that can be read has a rotation's columns, and, of 16, the last row 0 0 0 1."""
+    values = _known(rows, range(count))
+    if values is None:
+        return True
+    if count == 16 and values[12:].tolist() != [0, 0, 0, 1]:
+        return False
+    R = values[:12].reshape(3, 4)[:, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return (
+            bool(np.abs(R.T @ R - np.eye(3)).max() < 0.5)
+            or not abs(_length(values[4:8]) - 1) < UNIT_TOLERANCE
+        )
+
+
+def _known(rows: WordTable, columns: range | tuple[int, ...]) -> Array | None:
+    """The numbers in some columns of the first line in which all can be read."""
+    for words in rows.words[:LOOKED_AT]:
+        try:
+            values = np.array([float(words[k]) for k in columns])
+        except ValueError:
+            continue
+        if np.isfinite(values).all() and values[-4:].any():
+            return values
+    return None
+
+
+def _length(q: Array) -> float:
+    with np.errstate(over="ignore"):
+        return float(np.linalg.norm(q))
+
+
+class _Chosen(NamedTuple):
+    """Columns that are read, and what is to be told about them."""
+
+    layout: Layout
+    notes: tuple[str, ...]
+
+
+def _columns(rows: WordTable, format: str) -> _Chosen:
+    """Columns of a pose: those of the header, else the usual ones; one number more may stand before them."""
+    if rows.header is not None:
+        return _Chosen(rows.header, ())
+    count, names = len(rows.words[0]), EUROC if format == "euroc" else TUM
+    if count < len(names):
+        what = f"{count} columns; expected {len(names)}: {', '.join(names)}{_short(count)}"
+        raise FormatError(rows.path, rows.lines[0], what)
+    pose = ORDERS[format]
+    if count in (WIDE if rows.commas else WIDE[:1]):
+        return _Chosen(Layout((0,), pose), ())
+    first = 0
+    for start in (0, 1) if is_whole(rows.words[0][0]) else (0,):
+        values = _known(rows, tuple(k + start for k in pose))
+        if values is not None and abs(_length(values[3:]) - 1) < UNIT_TOLERANCE:
+            first = start
+            break
+    told = telling.passed_over(count, first, names)
+    return _Chosen(Layout((first,), tuple(k + first for k in pose)), (told,))
+
+
+# --- poses -----------------------------------------------------------------------------------------
+
+
+def _read_poses(rows: WordTable, format: str) -> TrajectoryFile:
+    """Poses with times: lost ones left out, in the order of time."""
+    (layout, odd) = _columns(rows, format)
+    kept = [k for k, words in enumerate(rows.words) if not _lost(words, layout.pose)]
+    lost = (
+        [line for k, line in enumerate(rows.lines) if k not in set(kept)]
+        if len(kept) < len(rows.words)
+        else []
+    )
+    if not kept:
+        raise FormatError(
+            rows.path, rows.lines[0], f"no pose in {len(rows.words)} lines: none has finite numbers"
+        )
+    lines = [rows.lines[k] for k in kept]
+    values = _numbers(rows, kept, layout.pose, ("tx", "ty", "tz", "qw", "qx", "qy", "qz"))
+    usual = layout.unit or ("ns" if format == "euroc" else "s")
+    words = [[rows.words[k][c] for c in layout.time] for k in kept]
+    stamps = read_stamps(rows.path, lines, words, usual, layout.unit is not None)
+    key = stamps.times if stamps.nanoseconds is None else stamps.nanoseconds
+    order = np.argsort(key, kind="stable")
+    table = Columns(rows.path, values, np.array(lines))
+    positions, (R, unit_error) = _positions(table, (0, 1, 2)), _rotations(table, values[:, 3:], rows.cut)
+    repeated = np.flatnonzero(np.diff(key[order]) == 0) + 1
+    notes = (
+        *rows.notes,
+        *odd,
+        *telling.unit(stamps.unit, usual),
+        *telling.lost(lost, len(rows.words)),
+        *telling.falling(stamps.times, table.lines),
+        *telling.doubled(table.lines[order[repeated]], len(kept)),
+        *telling.lengths(unit_error),
+    )
+    trajectory = Trajectory(stamps.times[order], positions[order], R[order])
+    ns = None if stamps.nanoseconds is None else stamps.nanoseconds[order]
+    as_read = AsRead(values[order, 3:], ns)
+    places, w_first = np.array(kept)[order], layout.pose[3] < layout.pose[4]
+    return TrajectoryFile(
+        trajectory, format, as_read, unit_error, len(repeated), notes, places, len(rows.words), w_first
+    )
+
+
+def _read_kitti(rows: WordTable) -> TrajectoryFile:
+    """Matrices, line by line."""
+    count = len(rows.words[0])
+    if count not in (12, 16) or (count == 16 and not _is_matrix(rows, count)):
+        raise FormatError(rows.path, rows.lines[0], f"{count} columns; expected 12: {', '.join(KITTI)}")
+    kept = [k for k, words in enumerate(rows.words) if not _lost(words, range(12))]
+    if not kept:
+        raise FormatError(
+            rows.path, rows.lines[0], f"no pose in {len(rows.words)} lines: none has finite numbers"
+        )
+    values = _numbers(rows, kept, range(12), KITTI)
+    table = Columns(rows.path, values, np.array([rows.lines[k] for k in kept]))
+    R = values.reshape(-1, 3, 4)[:, :, :3].copy()
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not a rotation either
+        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max((1, 2))
+        off[np.linalg.det(R) < 0] = 2.0  # a mirror
+    table.require(
+        off <= UNIT_TOLERANCE,
+        lambda k: (
+            f"not a rotation matrix (R^T R is {off[k]:.3g} off the identity, or det R < 0); "
+            "expected 12 numbers of one pose, row by row"
+        ),
+    )
+    gone = sorted(set(rows.lines) - set(table.lines.tolist()))
+    notes = (*rows.notes, *telling.lost(gone, len(rows.words)), *telling.matrices(float(off.max())))
+    trajectory = Trajectory(None, _positions(table, (3, 7, 11)), R)
+    return TrajectoryFile(
+        trajectory, "kitti", AsRead(), float(off.max()), 0, notes, np.array(kept), len(rows.words)
+    )
+
+
+def _lost(words: list[str], columns: range | tuple[int, ...]) -> bool:
+    """Whether a line is of a frame without a pose: a number that is none, or a rotation of zeros only.
+
+    TUM's own program leaves out such lines, too.
+    """
+    if any(is_lost(words[k]) for k in columns):
+        return True
+    rotation = columns[3:] if len(columns) == 7 else [k for k in columns if k % 4 != 3]
+    return all(re.fullmatch(r"[-+]?0*\.?0*([eE][-+]?\d+)?", words[k]) for k in rotation)
+
+
+def _numbers(
+    rows: WordTable, kept: list[int], columns: range | tuple[int, ...], names: tuple[str, ...]
+) -> Array:
+    """Numbers of some lines and columns, all finite."""
+    return np.array([
+        [number(rows.path, rows.lines[k], rows.words[k][c], name)
+         for c, name in zip(columns, names, strict=True)]
+        for k in kept
+    ])  # fmt: skip
+
+
 def _positions(table: Columns, columns: tuple[int, int, int]) -> Array:
     positions: Array = table.values[:, columns].copy()
     far = np.abs(positions) >= LONGEST
@@ -148,24 +297,19 @@ def _positions(table: Columns, columns: tuple[int, int, int]) -> Array:
     return positions
 
 
-def _require_times(table: Columns, exact: IntArray | None = None) -> int:
-    """Count times that repeat the one above; refuse times that go back."""
-    times = table.values[:, 0]
-    step = np.diff(times if exact is None else exact)
-    after = np.concatenate([[1], step])
-    table.require(
-        after >= 0, lambda k: f"time {times[k]:.9f} s after {times[k - 1]:.9f} s; times must not go back"
-    )
-    return int((after == 0).sum())
+def _rotations(table: Columns, q: Array, cut: int) -> tuple[Array, float]:
+    """Rotation matrices (N, 3, 3) of quaternions wxyz (N, 4), and the worst length's distance from 1.
 
-
-def _rotations(table: Columns, q: Array) -> tuple[Array, float]:
-    """Rotation matrices (N, 3, 3) of quaternions wxyz (N, 4), and the worst length's distance from 1."""
+    ``cut`` is the number of a line that the file's end may have cut, or 0.
+    """
     with np.errstate(over="ignore"):
         length = np.linalg.norm(q, axis=1)
     off = np.abs(length - 1.0)
     table.require(
         off <= UNIT_TOLERANCE,
-        lambda k: f"quaternion of length {length[k]:.6g}; expected 1 within {UNIT_TOLERANCE:g}",
+        lambda k: (
+            f"quaternion of length {length[k]:.6g}; expected 1 within {UNIT_TOLERANCE:g}"
+            f"{CUT if table.lines[k] == cut else ''}"
+        ),
     )
     return matrices(q), float(off.max())

@@ -25,7 +25,7 @@ from vslam_ref.experiments.visual_slam.running import (
     path,
 )
 from vslam_ref.geometry.alignment import Alignment
-from vslam_ref.metrics.trajectory import Trajectory, absolute_error
+from vslam_ref.metrics.trajectory import MAX_DIFFERENCE, Trajectory, absolute_error, associate, no_pairs
 from vslam_ref.support.config import assumptions
 from vslam_ref.support.provenance import versions
 from vslam_ref.systems.ptam import STAGES, ConcurrentPtam
@@ -84,7 +84,7 @@ def accuracy(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> Accur
     both = [(rows[int(a)], int(b)) for a, b in zip(*pairs, strict=True) if int(a) in rows]
     if len(both) < LEAST_THIRD:
         what = f"{len(both)} pictures have a pose and a true pose: need {LEAST_THIRD}"
-        return nothing._replace(reason=what)
+        return nothing._replace(reason=_clocks(sequence, numbers, T_cam_world) or what)
     mine, theirs = np.array(both).T
     estimate, truth = trajectory(None, T_cam_world[mine]), sequence.truth.take(theirs)
     truth = Trajectory(None, truth.t_world_body, truth.R_world_body)
@@ -96,6 +96,22 @@ def accuracy(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> Accur
     percent = 100 * found.stats.rmse / length if length > 0 else None
     drift = scale_drift(estimate, truth)
     return Accuracy(found.stats.rmse, percent, drift, found.alignment, truth.t_world_body, "")
+
+
+def _clocks(sequence: Sequence, numbers: IntArray, T_cam_world: Array) -> str:
+    """Why poses that were found have no true one: what their times say, in the words of ``evaluate``."""
+    truth = sequence.truth
+    if len(numbers) < LEAST_THIRD or truth is None or truth.times is None:
+        return ""
+    estimate = trajectory(sequence.times[numbers], T_cam_world)
+    assert estimate.times is not None
+    pairs = associate(estimate.times, truth.times)
+    if len(pairs.truth) >= LEAST_THIRD:
+        return ""
+    told = no_pairs(estimate, truth, pairs, MAX_DIFFERENCE, options=False)
+    falls = int((np.diff(sequence.times) < 0).sum())
+    mend = f"; first mend the times of the pictures, which go back at {falls} of them"
+    return told + mend if falls else told
 
 
 def document(run: Run, seconds: float) -> dict[str, Any]:

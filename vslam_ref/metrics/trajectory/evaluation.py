@@ -8,6 +8,7 @@ import numpy as np
 
 from vslam_ref.metrics.trajectory.association import MAX_DIFFERENCE, Pairs, associate
 from vslam_ref.metrics.trajectory.ate import LEAST_PAIRS, AbsoluteError, absolute_error
+from vslam_ref.metrics.trajectory.hints import no_pairs
 from vslam_ref.metrics.trajectory.poses import Trajectory
 from vslam_ref.metrics.trajectory.rpe import RelativeError, relative_error
 
@@ -58,6 +59,7 @@ def evaluate(
     mode: str = "se3",
     *,
     max_difference: float = MAX_DIFFERENCE,
+    offset: float = 0.0,
     frames: int = 1,
 ) -> Evaluation:
     """Pair, align and compare two trajectories.
@@ -70,6 +72,8 @@ def evaluate(
         What the alignment may change, see :func:`absolute_error`.
     max_difference : float
         Seconds between the two poses of a pair, at most.
+    offset : float
+        Seconds that are added to the estimate's times first.
     frames : int
         Length of a step of the relative error, in pairs.
 
@@ -82,22 +86,34 @@ def evaluate(
     --------
     >>> times = np.arange(4.0)
     >>> path = Trajectory(times, np.eye(4)[:, :3], np.broadcast_to(np.eye(3), (4, 3, 3)))
-    >>> evaluate(path, path, "none").numbers()["ate_max"]
+    >>> evaluate(path.later(2.5), path, "none", offset=-2.5).numbers()["ate_max"]
     0.0
     """
-    pairs = pair_up(estimate, truth, max_difference)
+    moved = estimate.later(offset) if offset else estimate
+    pairs = pair_up(moved, truth, max_difference, offset)
     paired = truth.take(pairs.truth)
-    absolute = absolute_error(estimate.take(pairs.estimate), paired, mode)
+    absolute = absolute_error(moved.take(pairs.estimate), paired, mode)
     return Evaluation(pairs, paired, absolute, relative_error(absolute.aligned, paired, frames))
 
 
-def pair_up(estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE) -> Pairs:
+def pair_up(
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE, offset: float = 0.0
+) -> Pairs:
     """Pair poses by time, or by their place if neither trajectory has times.
+
+    Parameters
+    ----------
+    estimate, truth : Trajectory
+    max_difference : float
+        Seconds between the two poses of a pair, at most.
+    offset : float
+        Seconds that were added to the estimate's times already: for the words of the error.
 
     Raises
     ------
     ValueError
-        If only one has times, the lengths differ where they must not, or fewer than 3 pairs are found.
+        If only one has times, the lengths differ where they must not, or fewer than 3 pairs are found; then
+        with the unit of time or the offset that would give more, if one is found.
     """
     if (estimate.times is None) != (truth.times is None):
         which = "truth" if estimate.times is not None else "estimate"
@@ -110,7 +126,5 @@ def pair_up(estimate: Trajectory, truth: Trajectory, max_difference: float = MAX
         return Pairs(every, every)
     pairs = associate(estimate.times, truth.times, max_difference)
     if len(pairs.truth) < LEAST_PAIRS:
-        spans = [f"{t[0]:.3f} to {t[-1]:.3f} s" for t in (estimate.times, truth.times)]
-        found = f"{len(pairs.truth)} pairs of poses within {max_difference:g} s"
-        raise ValueError(f"{found}: need {LEAST_PAIRS}; estimate {spans[0]}, truth {spans[1]}")
+        raise ValueError(no_pairs(estimate, truth, pairs, max_difference, offset))
     return pairs

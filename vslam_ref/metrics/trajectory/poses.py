@@ -57,6 +57,18 @@ class Trajectory:
         times = None if self.times is None else self.times[index]
         return Trajectory(times, self.t_world_body[index], self.R_world_body[index])
 
+    def later(self, offset: float) -> Trajectory:
+        """Return the same poses with times moved by an offset in seconds.
+
+        Raises
+        ------
+        ValueError
+            If there are no times.
+        """
+        if self.times is None:
+            raise ValueError(f"poses without times cannot be moved by {offset:g} s")
+        return Trajectory(self.times + offset, self.t_world_body, self.R_world_body)
+
 
 class Summary(NamedTuple):
     """Statistics of errors that are not negative, all in the unit of the errors.
