@@ -333,7 +333,7 @@ SAMPLES: dict[str, list[Sample]] = {
     "bundle_files.by_content:detect": [Sample({"problem.bz2": bz2.compress(_BAL.encode())}, binary=True)],
     "calibration_files.euroc:read_euroc": [Sample(_one("sensor.yaml", SENSOR), check=camera_wrong)],
     "calibration_files.kalibr:read_kalibr": [Sample(_one("camchain.yaml", KALIBR), check=camera_wrong)],
-    "calibration_files.opencv_yaml:read_opencv": [Sample(_one("camera.yaml", OPENCV), check=camera_wrong)],
+    "calibration_files.opencv_storage:read_opencv": [Sample(_one("camera.yaml", OPENCV), check=camera_wrong)],
     "calibration_files.ptam:read_ptam": [
         Sample(
             _one("camera.cfg", PTAM), lambda folder: (folder / "camera.cfg", (640, 480)), check=camera_wrong

@@ -89,7 +89,7 @@ def test_a_large_file_takes_time_in_proportion(name: str, monkeypatch: pytest.Mo
     """
     monkeypatch.setattr(fuzz_readers, "LIMIT", 60.0)
     monkeypatch.setattr(fuzz_readers, "PROCESSOR", 5.0)
-    size = 2**17 if name.split(":")[0].endswith(("euroc", "kalibr", "opencv_yaml")) else 2**19
+    size = 2**17 if name.split(":")[0].endswith(("euroc", "kalibr", "opencv_storage")) else 2**19
     for sample in SAMPLES[name]:
         with scratch() as root:
             put(root, sample.files)

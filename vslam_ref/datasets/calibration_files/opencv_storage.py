@@ -1,7 +1,8 @@
-"""OpenCV's FileStorage YAML: ``%YAML:1.0`` of versions 3 and 4, ``%YAML 1.2`` of version 5.
+"""OpenCV's FileStorage: YAML (``%YAML:1.0`` of versions 3 and 4, ``%YAML 1.2`` of 5), XML, JSON, and packed.
 
-Matrices are entries ``rows``, ``cols``, ``dt``, ``data``, with or without the tag ``!!opencv-matrix``.
-OpenCV has no rule for names; those of its samples, of ROS and of this package are known::
+Matrices are entries ``rows``, ``cols``, ``dt``, ``data`` (also in base 64), with or without the tag
+``!!opencv-matrix``, or lists of rows.  OpenCV has no rule for names; those of its samples, of ROS and of this
+package are known::
 
     camera_matrix             3 x 3: fx, 0, cx, 0, fy, cy, 0, 0, 1
     distortion_coefficients   k1 k2 p1 p2 [k3 [k4 k5 k6]], or k1 k2 k3 k4 of a fisheye
@@ -14,27 +15,34 @@ OpenCV's pixel (0, 0) is the centre of the top-left pixel, as ours.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
 from vslam_ref.arrays import Array
+from vslam_ref.datasets.calibration_files.lenses import lens_camera, lens_name, numbers_of
 from vslam_ref.datasets.calibration_files.record import CameraFile
-from vslam_ref.datasets.yaml_nodes import Node, build, read_yaml
-from vslam_ref.geometry.cameras import MODELS, Camera
+from vslam_ref.datasets.storage_nodes import read_storage
+from vslam_ref.datasets.yaml_nodes import Node
+from vslam_ref.geometry.cameras import MODELS
 from vslam_ref.support.files import write_bytes
 
-MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "M")
-DISTORTION = ("distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "D1")
-WIDTH, HEIGHT = ("image_width", "image_Width"), ("image_height", "image_Height")
+MATRIX = (
+    *("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M", "CameraMatrix", "CameraMat"),
+    *("intrinsic_matrix", "mtx"),
+)
+DISTORTION = (
+    *("distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "DistCoeffs"),
+    *("distortion_coeffs", "dist_coeff", "dist_coefs", "DistCoeff", "DistortionCoefficients", "dist"),
+)
+"""With a number behind (M1, D1), they are those of one camera of several."""
+LIKELY = re.compile("dist|coef", re.IGNORECASE)
+"""In a name of an entry that may hold a lens."""
+WIDTH, HEIGHT = ("image_width", "image_Width", "width"), ("image_height", "image_Height", "height")
+SIZE = ("image_size", "imageSize", "ImageSize", "img_size", "resolution")
+MODEL_NAMES = ("camera_model", "distortion_model")
 STD = "standard_deviations"
-SYNONYMS = {
-    "plumb_bob": "radtan",
-    "radial-tangential": "radtan",
-    "rational_polynomial": "rational",
-    "equidistant": "fisheye",
-}
-COUNTS = {"pinhole": (0,), "radtan": (4, 5), "rational": (8,), "fisheye": (4,), "fov": (1,)}
 
 
 def read_opencv(
@@ -45,7 +53,7 @@ def read_opencv(
     Parameters
     ----------
     path : Path or str
-        YAML file.
+        YAML, XML or JSON, plain or packed; the content says which.
     matrix, distortion : str, optional
         Names of the two entries, for files with several cameras, as ``M2`` and ``D2``.
     model : str, optional
@@ -56,17 +64,21 @@ def read_opencv(
     FormatError
         Where the file is not as the module says.
     """
-    top = read_yaml(Path(path))
+    return from_entries(read_storage(Path(path)), matrix=matrix, distortion=distortion, model=model)
+
+
+def from_entries(
+    top: Node, *, matrix: str | None = None, distortion: str | None = None, model: str | None = None
+) -> CameraFile:
+    """:func:`read_opencv`, of a file that has been parsed."""
+    if model is not None and model not in MODELS:
+        raise ValueError(f"model={model!r}: must be one of {', '.join(MODELS)}")
     entries = top.items()
-    node = top.get(*((matrix,) if matrix else MATRIX))
-    sensor = _sensor(node)
-    names = [name for name in ((distortion,) if distortion else DISTORTION) if name in entries]
-    if distortion and not names:
-        top.get(distortion)
-    coefficients = _coefficients(entries[names[0]]) if names else np.zeros(0)
-    at = entries[names[0]] if names else node
-    name = model or _named_model(entries) or _model_of(coefficients)
-    camera = _camera(at, name, sensor, coefficients)
+    node = top.get(*((matrix,) if matrix else (*MATRIX, *(f"{name}1" for name in MATRIX))))
+    sensor = sensor_of(node)
+    at = _coefficients(entries, distortion, node)
+    k = [] if at is None else numbers_of(at).tolist()
+    camera = lens_camera(at or node, model or _named_model(entries), sensor, k)
     title = entries["camera_name"].text() if "camera_name" in entries else ""
     std = _std(entries[STD], len(camera.params)) if STD in entries else None
     return CameraFile(camera, _size(entries), name=title, std=std)
@@ -80,7 +92,7 @@ def _std(node: Node, count: int) -> tuple[float, ...]:
     return tuple(values.tolist())
 
 
-def _sensor(node: Node) -> Array:
+def sensor_of(node: Node) -> list[float]:
     """fx, fy, cx, cy of a camera matrix."""
     K = node.matrix()
     if K.shape != (3, 3):
@@ -89,46 +101,46 @@ def _sensor(node: Node) -> Array:
     if not np.array_equal(K, wanted):
         what = "has other numbers than fx, fy, cx, cy; expected 0 there and 1 at the end"
         raise node.error(f"{node.name} {what}")
-    return K[[0, 1, 0, 1], [0, 1, 2, 2]]
+    sensor: list[float] = K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    return sensor
 
 
-def _coefficients(node: Node) -> Array:
-    """Distortion coefficients, trailing zeros beyond the rational model left out."""
-    values = (node.matrix() if node.raw.id == "mapping" else node.vector()).ravel()
-    if len(values) in (12, 14) and not values[8:].any():
-        values = values[:8]
-    if len(values) > 8:
-        what = f"has {len(values)} numbers; no thin prism or tilt here, expected up to 8"
-        raise node.error(f"{node.name} {what}")
-    return values
+def _coefficients(entries: dict[str, Node], asked: str | None, node: Node) -> Node | None:
+    """The entry with the distortion coefficients; None where the file has none.
+
+    A name that only looks like it is refused: a lens must not be lost because its name is not known here.
+    """
+    number = re.sub(r".*\D", "", node.name)
+    names = [
+        name for name in ((asked,) if asked else (f"{n}{number}" for n in DISTORTION)) if name in entries
+    ]
+    if names:
+        return entries[names[0]]
+    if asked:
+        raise node.error(f"no {asked} beside {node.name}; found: {', '.join(entries)}")
+    for name, entry in entries.items():
+        if LIKELY.search(name) and name not in MODEL_NAMES and entry.raw.id != "scalar":
+            known = ", ".join(DISTORTION)
+            raise entry.error(
+                f"{name} may hold distortion coefficients, under a name of its own; use {known}"
+            )
+    return None
 
 
 def _named_model(entries: dict[str, Node]) -> str | None:
     """Model that the file names, by our name."""
-    for key in ("camera_model", "distortion_model"):
-        if key in entries:
-            return entries[key].choice({name: name for name in MODELS} | SYNONYMS)
+    for key in MODEL_NAMES:
+        if key in entries and entries[key].text().strip():
+            return lens_name(entries[key])
     return "fisheye" if "fisheye_model" in entries and entries["fisheye_model"].number() else None
-
-
-def _model_of(coefficients: Array) -> str:
-    return "pinhole" if len(coefficients) == 0 else "radtan" if len(coefficients) <= 5 else "rational"
-
-
-def _camera(node: Node, name: str, sensor: Array, coefficients: Array) -> Camera:
-    if name not in MODELS:
-        raise ValueError(f"model={name!r}: must be one of {', '.join(MODELS)}")
-    if len(coefficients) not in COUNTS[name] and not (name == "pinhole" and not coefficients.any()):
-        right = " or ".join(map(str, COUNTS[name]))
-        raise node.error(f"{node.name}: {len(coefficients)} coefficients for {name}; expected {right}")
-    k = coefficients.tolist() if name != "pinhole" else []
-    camera: Camera = build(node, MODELS[name], *sensor.tolist(), *k)
-    return camera
 
 
 def _size(entries: dict[str, Node]) -> tuple[int, int] | None:
     width, height = ([entries[n] for n in names if n in entries] for names in (WIDTH, HEIGHT))
-    return (width[0].integer(), height[0].integer()) if width and height else None
+    if width and height:
+        return width[0].integer(), height[0].integer()
+    both = [entries[name] for name in SIZE if name in entries]
+    return both[0].size() if both else None
 
 
 def write_opencv(path: Path | str, file: CameraFile) -> None:
