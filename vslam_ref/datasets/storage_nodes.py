@@ -116,8 +116,10 @@ def _xml(path: Path, data: bytes) -> Node:
     except expat.ExpatError as error:
         what = f"{expat.ErrorString(error.code)}; expected XML"
         raise FormatError(path, error.lineno, what) from None
-    except ValueError as error:  # an encoding that expat does not know; a FormatError passes
-        raise error if isinstance(error, FormatError) else FormatError(path, None, str(error)) from None
+    except FormatError:
+        raise
+    except (ValueError, LookupError) as error:  # an encoding that Python does not know
+        raise FormatError(path, None, f"{error}; expected XML in UTF-8") from None
     name, line, raw = open_ones[0].children[0]
     if name != ROOT:
         raise FormatError(path, line, f"<{name}>; expected <{ROOT}>, as OpenCV writes it")

@@ -69,11 +69,13 @@ def from_chain(top: Node) -> tuple[CameraFile, ...]:
     found = []
     for node, T_cam_rig, notes in zip(nodes, poses, told, strict=True):
         size = node.get("resolution").size() if "resolution" in node.items() else None
-        found.append(CameraFile(_camera(node), size, T_cam_rig, node.name, notes=notes))
+        camera, odd = _camera(node)
+        found.append(CameraFile(camera, size, T_cam_rig, node.name, notes=(*odd, *notes)))
     return tuple(found)
 
 
-def _camera(node: Node) -> Camera:
+def _camera(node: Node) -> tuple[Camera, tuple[str, ...]]:
+    """The camera, and what is to be told about it."""
     kind, intrinsics, entries = node.get("camera_model"), node.get("intrinsics"), node.items()
     word = kind.text().strip().lower()
     if word in WIDE:
@@ -88,13 +90,14 @@ def _camera(node: Node) -> Camera:
         make, count = MODELS["none"]
     else:
         make, count = node.get("distortion_model").choice(MODELS)
-    given = entries.get("distortion_coeffs")
+    if count and word in BARE:
+        model = node.get("distortion_model")
+        raise model.error(f"distortion_model is {model.text()!r} beside {word}; expected none")
     k = node.get("distortion_coeffs").vector(count).tolist() if count else []
-    if (count and word in BARE) or (not count and given is not None and given.vector().any()):
-        what = f"distortion of {word} is {node.get('distortion_model').text()!r} with coefficients"
-        raise (given or node).error(f"{what}; expected none, and none there")
     camera: Camera = build(intrinsics, make, *sensor, *k)
-    return camera
+    unused = not count and "distortion_coeffs" in entries and entries["distortion_coeffs"].vector().any()
+    told = f"{node.name}: distortion_model is none, so distortion_coeffs are not used"
+    return camera, (told,) if unused else ()
 
 
 def _poses(nodes: list[Node]) -> tuple[list[Array | None], list[tuple[str, ...]]]:

@@ -93,7 +93,7 @@ def lens_camera(node: Node, name: str | None, sensor: Sequence[float], given: Se
         last three out.
     """
     k = list(given)
-    if name is None or (name in ("radtan", "rational") and len(k) > 8):
+    if name is None or (name in ("radtan", "rational") and not 0 < len(k) <= 8):
         name = "pinhole" if not k else "radtan" if len(k) <= 5 else "rational"
     if name == "rational" and len(k) > 8:
         if any(k[8:]):

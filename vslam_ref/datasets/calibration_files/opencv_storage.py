@@ -117,7 +117,7 @@ def _coefficients(entries: dict[str, Node], asked: str | None, node: Node) -> No
     if names:
         return entries[names[0]]
     if asked:
-        raise node.error(f"no {asked} beside {node.name}; found: {', '.join(entries)}")
+        raise node.error(f"the file has no {asked}; found: {', '.join(entries)}")
     for name, entry in entries.items():
         if LIKELY.search(name) and name not in MODEL_NAMES and entry.raw.id != "scalar":
             known = ", ".join(DISTORTION)
