@@ -13,7 +13,7 @@ from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import CalibrationIterate, CalibrationProblem
 from vslam_ref.estimation.calibration.result import Calibration, Certainty, certainty
 from vslam_ref.estimation.calibration.start import Start, find_start, state_of
-from vslam_ref.estimation.calibration.weakness import directions, regular_point, sensor_causes
+from vslam_ref.estimation.calibration.weakness import counts_as_one, regular_point, sensor_causes
 from vslam_ref.estimation.least_squares import Descent, Options, descend
 from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.estimation.robust import L2, Loss
@@ -132,15 +132,16 @@ def _undetermined(
     """What is open, and why; judged where the sensor is a usual one if the fit found no minimum."""
     if ended and not sure.undetermined:
         return ""
-    point, focal = regular_point(corners, size, free)
-    if point is None:
+    regular = regular_point(corners, size, free)
+    if regular is None:
         return sure.undetermined
-    there = certainty(point, free).undetermined
-    what = sure.undetermined if ended else there
-    if not what:
+    there = certainty(regular.point, free).undetermined
+    if not ended and not there and counts_as_one(regular.boards, corners, free):
+        there = "fx, fy, cx, cy"
+    if not ended and not there:
         return ""
-    causes = sensor_causes(corners, directions(point.state.T_cam_board, focal), free)
-    return "; ".join([what, *causes])
+    what = sure.undetermined if ended else f"{there} (at a usual focal length; the search found no best one)"
+    return "; ".join([what, *sensor_causes(corners, regular.boards, free)])
 
 
 def _enough(corners: BoardCorners, free: Free) -> None:

@@ -13,23 +13,25 @@ whose sensor is held at a usual one; angles between boards hardly depend on whic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.calibration.board import BoardCorners
+from vslam_ref.estimation.calibration.homography import homography
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import (
     CalibrationIterate,
     CalibrationProblem,
     CalibrationState,
 )
-from vslam_ref.estimation.calibration.start import find_start, state_of
+from vslam_ref.estimation.calibration.start import LEAST_COSINE, find_start, state_of
 from vslam_ref.estimation.least_squares import Options, descend
 from vslam_ref.estimation.robust import L2
 from vslam_ref.geometry import so3
-from vslam_ref.geometry.cameras import Camera, Radtan
+from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
 
 if TYPE_CHECKING:
     from vslam_ref.estimation.calibration.result import Calibration
@@ -62,16 +64,24 @@ class BoardDirections(NamedTuple):
     focal: float | None
 
 
-def regular_point(
-    corners: BoardCorners, size: tuple[int, int], free: Free
-) -> tuple[CalibrationIterate | None, float]:
-    """The problem at the best fit of a usual sensor: focal length as the larger side, centre in the middle.
+class RegularPoint(NamedTuple):
+    """The problem at the best fit of a usual sensor.
 
-    Returns
-    -------
-    (CalibrationIterate or None, float)
-        All free parameters are free again there, so its normal equations tell what is not determined; and
-        the focal length that was assumed, pixels.
+    Attributes
+    ----------
+    point : CalibrationIterate
+        All free parameters are free again there: its normal equations tell what is not determined.
+    boards : BoardDirections
+    """
+
+    point: CalibrationIterate
+    boards: BoardDirections
+
+
+def regular_point(corners: BoardCorners, size: tuple[int, int], free: Free) -> RegularPoint | None:
+    """The best fit of a sensor with the larger side as focal length, and the centre in the middle.
+
+    None where no such camera sees the corners.
 
     Notes
     -----
@@ -86,23 +96,60 @@ def regular_point(
     try:
         start = find_start(corners, size, held)
     except ValueError:
-        return None, focal
+        return None
     fit = CalibrationProblem(corners, held, L2())
     here = fit.linearise(state_of(start, held))
     if here is None:
-        return None, focal
+        return None
     found = descend(fit, here, Options(step=1e-8, cost=1e-10, max_iterations=50)).here.state
     params = np.array([usual[name] for name in names]) if bare else found.params
-    problem = CalibrationProblem(corners, free, L2())
-    return problem.linearise(CalibrationState(params, found.T_cam_board)), focal
+    point = CalibrationProblem(corners, free, L2()).linearise(CalibrationState(params, found.T_cam_board))
+    if point is None:
+        return None
+    cameras = (held.model.from_params(found.params), Pinhole(*(usual[name] for name in SENSOR)))
+    return RegularPoint(point, directions(corners, cameras, focal))
 
 
-def directions(T_cam_board: Array, focal: float | None = None) -> BoardDirections:
-    """Tilts and angles of some poses (V, 4, 4)."""
-    normals = T_cam_board[:, :3, 2]
-    tilts = np.arccos(np.clip(np.abs(normals[:, 2]), 0.0, 1.0))
-    apart = np.arccos(np.clip(np.abs(normals @ normals.T), 0.0, 1.0))
-    return BoardDirections(float(tilts.max()), float(apart.max()), focal)
+def directions(
+    corners: BoardCorners, cameras: Sequence[Camera], focal: float | None = None
+) -> BoardDirections:
+    """How the boards stand under that of some cameras that makes them most parallel.
+
+    Notes
+    -----
+    The normal of a plane is the vanishing line of its homography to rays, n = H^-T (0, 0, 1): parallel boards
+    have the same one whatever the focal length.  The rotation nearest to a homography would not do: it
+    answers for a wrong focal length as well.
+    """
+    found = [_normals(corners, camera) for camera in cameras]
+    stand = [
+        BoardDirections(
+            float(np.arccos(np.clip(np.abs(n[:, 2]), 0.0, 1.0)).max()),
+            float(np.arccos(np.clip(np.abs(n @ n.T), 0.0, 1.0)).max()),
+            focal,
+        )
+        for n in found
+        if n is not None
+    ]
+    return min(stand, key=lambda one: one.apart, default=BoardDirections(np.pi / 2, np.pi / 2, focal))
+
+
+def _normals(corners: BoardCorners, camera: Camera) -> Array | None:
+    """Unit normals (V, 3) of the boards in the camera's frame; None where the camera has no rays for them."""
+    rays = camera.unproject(corners.uv)
+    if not (rays.valid & (rays.bearing[:, 2] > LEAST_COSINE)).all():
+        return None
+    xn = rays.bearing[:, :2] / rays.bearing[:, 2:]
+    normals = np.empty((corners.views, 3))
+    for view in range(corners.views):
+        at = corners.view == view
+        H = homography(corners.X_board[at, :2], xn[at])
+        try:
+            normals[view] = np.linalg.solve(H.T, [0.0, 0.0, 1.0])
+        except np.linalg.LinAlgError:
+            return None
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / length if np.isfinite(length).all() and (length > 0).all() else None
 
 
 def why_flat(boards: BoardDirections) -> str:
@@ -121,6 +168,11 @@ def why_flat(boards: BoardDirections) -> str:
         f"{np.degrees(boards.tilt):.0f} degrees to the image plane{assumed}, and at most "
         f"{np.degrees(boards.apart):.2g} degrees apart; tilt the board in different directions"
     )
+
+
+def counts_as_one(boards: BoardDirections, corners: BoardCorners, free: Free) -> bool:
+    """Whether all boards are parallel, and their two equations too few for the free sensor."""
+    return boards.apart <= ALIKE and corners.views > 1 and sum(name in SENSOR for name in free.names) > 2
 
 
 def sensor_causes(corners: BoardCorners, boards: BoardDirections, free: Free) -> list[str]:
@@ -210,7 +262,10 @@ def doubts(result: Calibration, size: tuple[int, int]) -> tuple[str, ...]:
     std, focal = np.sqrt(np.diag(result.covariance)), float(min(params[:2]))
     told = []
     weak = [i for i in range(4) if std[i] > WEAK_SHARE * focal]
-    boards = directions(result.T_cam_board)
+    boards = directions(result.corners, (result.camera,))
+    if not weak and counts_as_one(boards, result.corners, result.free):
+        what = "the focal length rests on the bend of the lens alone"
+        told.append(f"{what}: {_values(names, params, std, [0, 1])}; {why_flat(boards)}")
     if weak:
         causes = sensor_causes(result.corners, boards, result.free) or [_general(result)]
         told.append(f"{WEAKLY} {_values(names, params, std, weak)}; {'; '.join(causes)}")
