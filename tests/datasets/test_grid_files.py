@@ -84,7 +84,7 @@ def test_negated_and_pgm_pictures_are_read(tmp_path: Path, grid: LogOddsGrid) ->
         ),
         ("occupied_thresh: 0.9\n", "", "has no occupied_thresh"),
         ("free_thresh: 0.1\n", "free_thresh: 0.9\n", "expected the first below the second"),
-        ("m.png", "/home/someone/maps/m.png", "lies beside the YAML: write 'image: m.png'"),
+        ("m.png", "/elsewhere/maps/m.png", "lies beside the YAML: write 'image: m.png'"),
         ("m.png", "C:\\maps\\m.png", "lies beside the YAML: write 'image: m.png'"),
         ("m.png", "other.png", "image is 'other.png'; expected a picture beside"),
         ("m.png", "m.yaml", "no image that can be read"),

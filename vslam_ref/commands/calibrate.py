@@ -16,7 +16,7 @@ from vslam_ref.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from vslam_ref.commands.board_pictures import BoardPictures
+    from vslam_ref.commands.board_images import BoardImages
     from vslam_ref.estimation.calibration import Calibration
 
 HELP = "calibrate a camera from images of a checkerboard"
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the corners, calibrate, print the numbers and write what was asked for."""
-    from vslam_ref.commands.board_pictures import find_boards
+    from vslam_ref.commands.board_images import find_boards
     from vslam_ref.datasets.calibration_files import CameraFile, write_opencv
     from vslam_ref.datasets.pictures import image_files
     from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly, doubts
@@ -133,7 +133,7 @@ def _refuse(result: Calibration) -> None:
         )
 
 
-def _numbers(model: str, found: BoardPictures, result: Calibration, seconds: float) -> dict[str, Any]:
+def _numbers(model: str, found: BoardImages, result: Calibration, seconds: float) -> dict[str, Any]:
     camera = result.camera
     return {
         "model": model,

@@ -34,7 +34,7 @@ SAVED_FREE, SAVED_UNKNOWN = 254, 205
 """Greys of map_saver."""
 
 
-class Rule(NamedTuple):
+class MapRule(NamedTuple):
     """How pixels become cells: the mode, whether white is occupied, and the thresholds of p."""
 
     mode: str
@@ -43,7 +43,7 @@ class Rule(NamedTuple):
     free: float
 
 
-def read_rule(top: Node) -> Rule:
+def read_rule(top: Node) -> MapRule:
     """The rule that a map's YAML states.
 
     Raises
@@ -55,12 +55,12 @@ def read_rule(top: Node) -> Rule:
     mode = entries["mode"].choice(MODES) if "mode" in entries else "trinary"
     negate = top.get("negate").choice(NEGATE)
     if mode == "raw":
-        return Rule(mode, negate, 1.0, 0.0)
+        return MapRule(mode, negate, 1.0, 0.0)
     occupied, free = _threshold(top.get("occupied_thresh")), _threshold(top.get("free_thresh"))
     if not free < occupied:
         what = f"free_thresh is {free:g}, occupied_thresh {occupied:g}; expected the first below the second"
         raise top.get("free_thresh").error(what)
-    return Rule(mode, negate, occupied, free)
+    return MapRule(mode, negate, occupied, free)
 
 
 def _threshold(node: Node) -> float:
@@ -72,14 +72,14 @@ def _threshold(node: Node) -> float:
     return value
 
 
-def cells_of(picture: Channels, rule: Rule) -> tuple[Array, tuple[str, ...]]:
+def cells_of(picture: Channels, rule: MapRule) -> tuple[Array, tuple[str, ...]]:
     """Probability of each pixel's cell (H, W), first row on top, and what is to be told.
 
     Parameters
     ----------
     picture : Channels
         Colours (H, W, n), 0 to 255, and opacity.
-    rule : Rule
+    rule : MapRule
         Thresholds are probabilities.
     """
     grey = picture.colours.mean(axis=-1)
@@ -98,14 +98,14 @@ def cells_of(picture: Channels, rule: Rule) -> tuple[Array, tuple[str, ...]]:
     return cells, _saved_as_unknown(grey, free, rule)
 
 
-def _raw_cells(grey: Array, rule: Rule) -> tuple[Array, tuple[str, ...]]:
+def _raw_cells(grey: Array, rule: MapRule) -> tuple[Array, tuple[str, ...]]:
     """Greys are per cent; ROS 1 negates them first if it is asked to, ROS 2 does not look at it."""
     per_cent = np.rint(255.0 - grey if rule.negate else grey)
     told = "raw with negate: 1: read as 255 - grey, as in ROS 1; ROS 2 takes the grey itself"
     return np.where(per_cent <= 100, per_cent / 100.0, 0.5), (told,) if rule.negate else ()
 
 
-def _saved_as_unknown(grey: Array, free: Array, rule: Rule) -> tuple[str, ...]:
+def _saved_as_unknown(grey: Array, free: Array, rule: MapRule) -> tuple[str, ...]:
     """A note where the threshold makes map_saver's unknown cells free."""
     odd = free & (grey == SAVED_UNKNOWN)
     if rule.mode != "trinary" or not odd.any() or not (grey == SAVED_FREE).any():
@@ -114,7 +114,7 @@ def _saved_as_unknown(grey: Array, free: Array, rule: Rule) -> tuple[str, ...]:
     return (f"{what} by free_thresh {rule.free:g}; 0.196 keeps them unknown",)
 
 
-def graded_cells(picture: Channels, rule: Rule) -> tuple[Array, tuple[str, ...]]:
+def graded_cells(picture: Channels, rule: MapRule) -> tuple[Array, tuple[str, ...]]:
     """Every grey as a probability, (H, W); colours 0 to 255."""
     grey = picture.colours.mean(axis=-1)
     return grey / 255.0 if rule.negate else (255.0 - grey) / 255.0, ()

@@ -81,7 +81,7 @@ class RegularPoint(NamedTuple):
 def regular_point(corners: BoardCorners, size: tuple[int, int], free: Free) -> RegularPoint | None:
     """The best fit of a sensor with the larger side as focal length, and the centre in the middle.
 
-    None where no such camera sees the corners.
+    Minimises :eq:`eq-calibration-cost` with this sensor held; None where no such camera sees the corners.
 
     Notes
     -----
@@ -240,7 +240,7 @@ def picture_uncertainty(camera: Camera, covariance: Array, size: tuple[int, int]
     return PictureUncertainty(rms, float(rays.valid.mean()), alone)
 
 
-def reach(corners: BoardCorners, size: tuple[int, int]) -> float:
+def _reach(corners: BoardCorners, size: tuple[int, int]) -> float:
     """How far out the outermost corner lies: 0 in the picture's middle, 1 in its corners."""
     middle = (np.array(size) - 1.0) / 2
     return float(np.linalg.norm(corners.uv - middle, axis=1).max() / np.linalg.norm(middle))
@@ -270,7 +270,7 @@ def doubts(result: Calibration, size: tuple[int, int]) -> tuple[str, ...]:
         causes = sensor_causes(result.corners, boards, result.free) or [_general(result)]
         told.append(f"{WEAKLY} {_values(names, params, std, weak)}; {'; '.join(causes)}")
     picture = picture_uncertainty(result.camera, result.covariance, size)
-    far = reach(result.corners, size)
+    far = _reach(result.corners, size)
     open_lens = picture.rms_px > WEAK_PICTURE * focal or (picture.field < LEAST_FIELD and far < NEAR_CENTRE)
     if open_lens and len(names) > 4:
         largest = picture.by_parameter[4:].max()

@@ -17,7 +17,7 @@ NAMED = 40
 """Pictures that are named one by one; of more, the first and how many others."""
 
 
-class BoardPictures(NamedTuple):
+class BoardImages(NamedTuple):
     """Pictures with a board and their corners, those without, copies of others, and the size they all have.
 
     ``copies`` are pairs (picture, the one that it repeats).
@@ -55,7 +55,7 @@ class BoardPictures(NamedTuple):
         return f" ({'; '.join(parts)})" if parts else ""
 
 
-def find_boards(paths: list[Path], board: Board) -> BoardPictures:
+def find_boards(paths: list[Path], board: Board) -> BoardImages:
     """Look for the board in all pictures.
 
     Raises
@@ -94,9 +94,9 @@ def find_boards(paths: list[Path], board: Board) -> BoardPictures:
 
 def _without_copies(
     found: list[tuple[Path, Array]], skipped: list[Path], size: tuple[int, int]
-) -> BoardPictures:
+) -> BoardImages:
     """The first picture of each view; the others with the one that they repeat."""
-    kept = BoardPictures([], [], skipped, [], size)
+    kept = BoardImages([], [], skipped, [], size)
     for path, uv in found:
         off = [float(np.sqrt(((uv - other) ** 2).sum(axis=1).mean())) for other in kept.corners]
         if off and min(off) < SAME_VIEW:
