@@ -53,8 +53,7 @@ def good(camera: Camera, sigma: float, seed: int, count: int = 10) -> list[Board
     return boards.views(BOARD, camera, boards.poses(BOARD, camera, SIZE, count, rng), sigma, rng)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("sigma", [0.05, 0.2])
+@pytest.mark.parametrize(("seed", "sigma"), [(0, 0.05), (1, 0.2)])
 @pytest.mark.parametrize("model", ["radtan", "pinhole"])
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 40.0])
 def test_parallel_boards_under_a_straight_lens(degrees: float, model: str, sigma: float, seed: int) -> None:
@@ -100,8 +99,7 @@ def test_corners_in_the_middle_only(fill: float, reached: int) -> None:
     assert doubts(calibrate(views, SIZE, "fov"), SIZE) == ()  # one angle is known from the middle
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("sigma", [0.05, 0.2])
+@pytest.mark.parametrize(("seed", "sigma"), [(0, 0.05), (1, 0.2)])
 @pytest.mark.parametrize("model", ["radtan", "fov", "fisheye"])
 def test_good_pictures_raise_nothing(model: str, sigma: float, seed: int) -> None:
     camera = BENT if model == "radtan" else Fov(400, 402, 322, 238, 0.9)

@@ -27,7 +27,7 @@ GZIP = b"\x1f\x8b"
 DEEPEST = 32
 """Elements inside of each other; OpenCV's own files have five."""
 ROOT = "opencv_storage"
-GLUED_KEY = re.compile(r"^(\s*[A-Za-z_][\w.]*):(?=[^\s:/])", re.MULTILINE)
+GLUED_KEY = re.compile(r"^([ \t]*[A-Za-z_][\w.]*):(?=[^\s:/])", re.MULTILINE)
 
 
 def read_storage(path: Path) -> Node:

@@ -28,7 +28,7 @@ from vslam_ref.datasets.text import FormatError, open_packed
 from vslam_ref.datasets.yaml_nodes import MAX_BYTES, Node, parse_yaml, plain_text
 
 END = re.compile(rb"^---[ \t]*\r?$\n?", re.MULTILINE)
-STAMPS = re.compile(rb"^\s*(seq|stamp|secs?|nsecs?|nanosec|nanosecs)\s*:.*$", re.MULTILINE)
+STAMPS = re.compile(rb"^[ \t]*(seq|stamp|secs?|nsecs?|nanosec|nanosecs)[ \t]*:.*$", re.MULTILINE)
 
 
 def read_camera_info(path: Path | str) -> CameraFile:
