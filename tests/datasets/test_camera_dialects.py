@@ -172,6 +172,9 @@ def test_small_files_that_would_become_large(tmp_path: Path) -> None:
     bomb = gzip.compress(b"a: " + b"0" * 50_000_000)
     with pytest.raises(FormatError, match="more than 1048576 bytes unpacked"):
         read_opencv(written(tmp_path, bomb))
+    half = gzip.compress(b"K: 1")[:-6]
+    with pytest.raises(FormatError, match="damaged gzip file"):
+        read_opencv(written(tmp_path, half))
     row = "r: &r [" + "1, " * 60_000 + "1]\n"
     with pytest.raises(FormatError, match=r"60001 numbers; at most 4096|rows; expected a matrix of a few"):
         read_opencv(written(tmp_path, row + "K: [" + "*r, " * 30_000 + "*r]\n"))

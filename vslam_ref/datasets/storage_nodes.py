@@ -52,12 +52,15 @@ def storage_bytes(path: Path) -> bytes:
     data = read_bytes(path, MAX_BYTES)
     if not data.startswith(GZIP):
         return data
+    unpack = zlib.decompressobj(31)
     try:
-        data = zlib.decompressobj(31).decompress(data, MAX_BYTES + 1)
+        data = unpack.decompress(data, MAX_BYTES + 1)
     except zlib.error as error:
         raise FormatError(path, None, f"damaged gzip file ({error}); fetch it again") from None
     if len(data) > MAX_BYTES:
         raise FormatError(path, None, f"more than {MAX_BYTES} bytes unpacked; is this the right file?")
+    if not unpack.eof:
+        raise FormatError(path, None, "damaged gzip file (its end is missing); fetch it again")
     return data
 
 

@@ -74,7 +74,7 @@ def from_entries(
     if model is not None and model not in MODELS:
         raise ValueError(f"model={model!r}: must be one of {', '.join(MODELS)}")
     entries = top.items()
-    node = top.get(*((matrix,) if matrix else (*MATRIX, *(f"{name}1" for name in MATRIX))))
+    node = _matrix(top, entries, (matrix,) if matrix else (*MATRIX, *(f"{name}1" for name in MATRIX)))
     sensor = sensor_of(node)
     at = _coefficients(entries, distortion, node)
     k = [] if at is None else numbers_of(at).tolist()
@@ -82,6 +82,15 @@ def from_entries(
     title = entries["camera_name"].text() if "camera_name" in entries else ""
     std = _std(entries[STD], len(camera.params)) if STD in entries else None
     return CameraFile(camera, _size(entries), name=title, std=std)
+
+
+def _matrix(top: Node, entries: dict[str, Node], names: tuple[str, ...]) -> Node:
+    """The entry with the camera matrix."""
+    for name in names:
+        if name in entries:
+            return entries[name]
+    known = " or ".join(names[:4]) + ("" if len(names) < 5 else " or the like (M1, mtx)")
+    raise top.error(f"{top.name} has no {known}; found: {', '.join(entries) or 'nothing'}")
 
 
 def _std(node: Node, count: int) -> tuple[float, ...]:
