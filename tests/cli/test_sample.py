@@ -193,7 +193,7 @@ def test_grid_maps_the_walls_and_not_the_people(samples: Path, tmp_path: Path) -
     assert found["dynamic_objects"] > 0
     log = carmen.read(samples / "laser" / "office.log")
     walls = np.loadtxt(samples / "laser" / "walls.csv", delimiter=",", skiprows=1)
-    grid = grid_files.read_ros_map(tmp_path / "out" / "static.yaml")
+    grid = grid_files.read_ros_map(tmp_path / "out" / "static.yaml").grid
     angle = log.poses[:, 2:] + log.scanner.angles
     way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     ends = (log.poses[:, None, :2] + log.ranges[..., None] * way)[log.ranges < 8.0]

@@ -181,6 +181,70 @@ distortion_coefficients: !!opencv-matrix
    dt: d
    data: [ -2.66e-01, -3.8e-02, 1.78e-03, -2.8e-04, 2.38e-01 ]
 """
+MESSAGE = """header:
+  stamp:
+    sec: 1700000000
+height: 480
+width: 752
+distortion_model: plumb_bob
+d: [-0.28, 0.07, 0.0002, 1.7e-05, 0.0]
+k: [458.5, 0.0, 367.25, 0.0, 457.25, 248.5, 0.0, 0.0, 1.0]
+binning_x: 0
+binning_y: 0
+roi:
+  x_offset: 0
+  y_offset: 0
+  height: 480
+  width: 752
+---
+"""
+SETTINGS = """%YAML:1.0
+File.version: "1.0"
+Camera.type: "PinHole"
+Camera1.fx: 458.5
+Camera1.fy: 457.25
+Camera1.cx: 367.25
+Camera1.cy: 248.5
+Camera1.k1: -0.28
+Camera1.k2: 0.07
+Camera1.p1: 0.0002
+Camera1.p2: 1.7e-05
+Camera.width: 752
+Camera.height: 480
+IMU.T_b_c1: !!opencv-matrix
+   rows: 4
+   cols: 4
+   dt: f
+   data: [0.0, -1.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.2, 0.0, 0.0, 1.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+"""
+STORED_XML = """<?xml version="1.0"?>
+<opencv_storage>
+<image_width>752</image_width>
+<image_height>480</image_height>
+<camera_matrix type_id="opencv-matrix">
+  <rows>3</rows>
+  <cols>3</cols>
+  <dt>d</dt>
+  <data>
+    458.5 0. 367.25 0. 457.25 248.5 0. 0. 1.</data></camera_matrix>
+<distCoeffs type_id="opencv-matrix">
+  <rows>1</rows>
+  <cols>5</cols>
+  <dt>d</dt>
+  <data type_id="binary">
+    MWQgICAgICAgICAgICAgICAgICAgICAgAAAAAAAAyL8AAAAAAACoP/yp8dJNYlA/
+    LUMc6+I2Kr+4HoXrUbiePw==</data></distCoeffs>
+</opencv_storage>
+"""
+STORED_JSON = """{
+    "image_width": 752, "image_height": 480,
+    "camera_matrix": {
+        "type_id": "opencv-matrix", "rows": 3, "cols": 3, "dt": "d",
+        "data": [ 458.5, 0.0, 367.25, 0.0, 457.25, 248.5, 0.0, 0.0, 1.0 ]
+    },
+    "distortion_coefficients": [[-0.28, 0.07, 0.0002, 1.7e-05, 0.0]]
+}
+"""
 KALIBR = """cam0:
   camera_model: pinhole
   intrinsics: [461.6, 460.3, 363.0, 248.1]
@@ -339,9 +403,23 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample(_one("problem", _BUNDLER), check=bundle_wrong),
     ],
     "bundle_files.by_content:detect": [Sample({"problem.bz2": bz2.compress(_BAL.encode())}, binary=True)],
+    "calibration_files.camera_info:read_camera_info": [
+        Sample(_one("camera_info.yaml", MESSAGE), check=camera_wrong)
+    ],
+    "calibration_files.orbslam:read_orbslam": [Sample(_one("settings.yaml", SETTINGS), check=camera_wrong)],
     "calibration_files.euroc:read_euroc": [Sample(_one("sensor.yaml", SENSOR), check=camera_wrong)],
     "calibration_files.kalibr:read_kalibr": [Sample(_one("camchain.yaml", KALIBR), check=camera_wrong)],
-    "calibration_files.opencv_yaml:read_opencv": [Sample(_one("camera.yaml", OPENCV), check=camera_wrong)],
+    "calibration_files.opencv_storage:read_opencv": [
+        Sample(_one("camera.yaml", OPENCV), check=camera_wrong),
+        Sample(_one("camera.xml", STORED_XML), check=camera_wrong),
+        Sample(_one("camera.json", STORED_JSON), check=camera_wrong),
+        Sample({"camera.yml.gz": gzip.compress(OPENCV.encode(), mtime=0)}, check=camera_wrong, binary=True),
+    ],
+    "storage_nodes:read_storage": [
+        Sample(_one("a.yaml", OPENCV)),
+        Sample(_one("a.xml", STORED_XML)),
+        Sample(_one("a.json", STORED_JSON)),
+    ],
     "calibration_files.ptam:read_ptam": [
         Sample(
             _one("camera.cfg", PTAM), lambda folder: (folder / "camera.cfg", (640, 480)), check=camera_wrong
@@ -377,6 +455,10 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample(_one("camera", OPENCV), lambda folder: (folder / "camera", (640, 480)), check=camera_wrong),
         Sample(
             _one("camera", TUM_MONO), lambda folder: (folder / "camera", (1280, 1024)), check=camera_wrong
+        ),
+        *(
+            Sample(_one("camera", text), lambda folder: (folder / "camera", (752, 480)), check=camera_wrong)
+            for text in (MESSAGE, SETTINGS, KALIBR, SENSOR, STORED_XML, STORED_JSON)
         ),
     ],
     "sequences.cameras:read_plain_camera": [Sample(_one("calib.txt", CALIB), check=camera_wrong)],

@@ -68,6 +68,10 @@ def test_damaged_files_give_a_record_or_one_line(name: str) -> None:
         assert tally.records > 0  # and not always deadly
 
 
+YAML = ("euroc", "kalibr", "opencv_storage", "orbslam", "camera_info", "storage_nodes", "cameras")
+"""Readers that parse YAML, among others."""
+
+
 def swollen(data: bytes, size: int) -> list[bytes]:
     """A file of about ``size`` bytes in which one thing comes again and again."""
     lines = data.split(b"\n")
@@ -89,7 +93,7 @@ def test_a_large_file_takes_time_in_proportion(name: str, monkeypatch: pytest.Mo
     """
     monkeypatch.setattr(fuzz_readers, "LIMIT", 60.0)
     monkeypatch.setattr(fuzz_readers, "PROCESSOR", 5.0)
-    size = 2**17 if name.split(":")[0].endswith(("euroc", "kalibr", "opencv_yaml")) else 2**19
+    size = 2**17 if name.split(":")[0].endswith(YAML) else 2**19
     for sample in SAMPLES[name]:
         with scratch() as root:
             put(root, sample.files)

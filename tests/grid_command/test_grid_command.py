@@ -101,9 +101,9 @@ def test_a_run_writes_its_maps_film_numbers_and_page(
     assert set(data.files) >= {"log_odds_s", "log_odds_d", "origin_xy", "resolution", "times"}
     assert data["times"].tolist() == pytest.approx([round(0.2 * k, 3) for k in range(60)])
     static = grid_files.read_ros_map(out / "static.yaml")
-    assert static.log_odds.shape == data["log_odds_s"].shape
+    assert static.grid.log_odds.shape == data["log_odds_s"].shape
     np.testing.assert_allclose(static.origin_xy, data["origin_xy"], atol=1e-12)
-    np.testing.assert_array_equal(static.states, np.sign(np.trunc(data["log_odds_s"] / np.log(9))) + 1)
+    np.testing.assert_array_equal(static.grid.states, np.sign(np.trunc(data["log_odds_s"] / np.log(9))) + 1)
     film = cv2.VideoCapture(str(out / "animation.webm"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == 60
     assert int(film.get(cv2.CAP_PROP_FRAME_WIDTH)) == 320

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import argparse
 import time
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    file_target,
+    json_target,
+    print_backend,
+    print_notes,
+    write_json,
+)
 
 if TYPE_CHECKING:
-    from vslam_ref.arrays import Array
-    from vslam_ref.estimation.calibration import Board, Calibration
+    from vslam_ref.commands.board_images import BoardImages
+    from vslam_ref.estimation.calibration import Calibration
 
 HELP = "calibrate a camera from images of a checkerboard"
 EPILOG = """\
-The board is given by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners; images in
-which the whole board is not seen are named and left out. Take 10 or more images, with the board tilted by 30
-to 45 degrees in different directions, near and far, and into all corners of the image.
+The board is given by its INNER corners: a board of 10 x 7 squares is 9x6. OpenCV finds the corners. Take 10
+or more images, with the whole board in sight, tilted by 30 to 45 degrees in different directions, near and
+far, and into all corners of the image.
 
 models:
   radtan    fx fy cx cy k1 k2 p1 p2 k3: radial and tangential (OpenCV, Kalibr, EuRoC); the default
@@ -26,7 +32,12 @@ models:
   pinhole   fx fy cx cy: no distortion
   rational  as radtan, with k4 k5 k6: needs many images
 
-Nothing is written, and the status is 2, where the images do not determine the camera.
+Nothing is written, and the status is 2, where the images do not determine the camera: a focal length or a
+centre with a standard deviation of more than 5 % of the focal length. The line names the parameters and the
+cause, as boards that are all parallel. What is only weak is told by a line 'note: ...': a sensor beyond 1 %,
+or a lens that leaves the place of a ray open by more than 2 % of the focal length, RMS over the picture (no
+board near the picture's border). Images without a board are named and left out, and so are copies: images
+whose corners are within 0.25 px of those of another.
 
 examples, after 'vslam-ref sample boards --out samples':
   vslam-ref calibrate samples/boards/radtan --board 9x6 --out camera.yaml
@@ -37,15 +48,6 @@ and with your own pictures:
 
 LOSSES = ("l2", "huber", "tukey")
 MODELS = ("radtan", "fov", "fisheye", "pinhole", "rational")
-
-
-class BoardImages(NamedTuple):
-    """Images with a board, their corners, those without, and the size they all have."""
-
-    used: list[Path]
-    corners: list[Array]
-    skipped: list[Path]
-    size: tuple[int, int]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,30 +79,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the corners, calibrate, print the numbers and write what was asked for."""
+    from vslam_ref.commands.board_images import find_boards
     from vslam_ref.datasets.calibration_files import CameraFile, write_opencv
     from vslam_ref.datasets.pictures import image_files
-    from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly
+    from vslam_ref.estimation.calibration import Board, calibrate, calibrate_robustly, doubts
 
     target = json_target(options)
     out = file_target(options.out)
     board = Board.from_text(options.board, options.square)
     fixed = _fixed(options.fix)
     began = time.perf_counter()
-    found = _find(image_files(options.images), board)
+    found = find_boards(image_files(options.images), board)
     views = [(board.points, uv) for uv in found.corners]
     more: dict[str, Any] = {"fixed": fixed, "aspect": options.aspect}
-    if options.loss == "l2":
-        result = calibrate(views, found.size, options.model, **more)
-    else:
-        result = calibrate_robustly(views, found.size, options.model, options.loss, **more).calibration
+    try:
+        if options.loss == "l2":
+            result = calibrate(views, found.size, options.model, **more)
+        else:
+            result = calibrate_robustly(views, found.size, options.model, options.loss, **more).calibration
+        _refuse(result)
+    except ValueError as error:
+        raise ValueError(f"{error}{found.aside()}") from None
     seconds = time.perf_counter() - began
-    _refuse(result)
-    numbers = _numbers(options.model, found, result, seconds)
-    _show(numbers, found, result)
+    notes = [*found.notes(), *doubts(result, found.size)]
+    numbers = _numbers(options.model, found, result, seconds) | {"notes": notes}
+    _show(numbers, result)
+    write_json(target, numbers)
     if out is not None:
         write_opencv(out, CameraFile(result.camera, found.size))
         print(f"camera written to {out}")
-    write_json(target, numbers)
     return 0
 
 
@@ -116,50 +123,14 @@ def _fixed(words: list[str]) -> dict[str, float]:
     return fixed
 
 
-def _find(paths: list[Path], board: Board) -> BoardImages:
-    """Look for the board in all images."""
-    from tqdm import tqdm
-
-    from vslam_ref.datasets.checkerboard import find_corners
-    from vslam_ref.datasets.pictures import read_grey
-    from vslam_ref.datasets.text import FormatError
-
-    used: list[Path] = []
-    skipped: list[Path] = []
-    corners: list[Array] = []
-    size: tuple[int, int] | None = None
-    for path in tqdm(paths, desc="corners", unit="image", leave=False, disable=None):
-        image = read_grey(path)
-        this = (image.shape[1], image.shape[0])
-        if size is not None and this != size:
-            right = f"the images before have {size[0]}x{size[1]}"
-            raise FormatError(path, None, f"{this[0]}x{this[1]} pixels; {right}, and one camera has one size")
-        size = this
-        uv = find_corners(image, board.columns, board.rows)
-        if uv is None:
-            skipped.append(path)
-        else:
-            used.append(path)
-            corners.append(uv)
-    if not used or size is None:
-        what = f"no board of {board.columns}x{board.rows} inner corners in {len(paths)} image(s)"
-        raise ValueError(f"{what}, {_some(paths)}; --board counts inner corners, not squares")
-    return BoardImages(used, corners, skipped, size)
-
-
-def _some(paths: list[Path]) -> str:
-    shown = ", ".join(path.name for path in paths[:3])
-    return shown if len(paths) <= 3 else f"{shown}, …"
-
-
 def _refuse(result: Calibration) -> None:
     """Say in one line why there is no camera."""
+    if result.undetermined:
+        raise ValueError(f"the images do not determine the camera: {result.undetermined}")
     if not result.converged:
         raise ValueError(
             f"not converged after {result.iterations} iterations ({result.reason}): {result.message}"
         )
-    if result.undetermined:
-        raise ValueError(f"the images do not determine {result.undetermined}")
 
 
 def _numbers(model: str, found: BoardImages, result: Calibration, seconds: float) -> dict[str, Any]:
@@ -167,9 +138,10 @@ def _numbers(model: str, found: BoardImages, result: Calibration, seconds: float
     return {
         "model": model,
         "image_size": list(found.size),
-        "images": len(found.used) + len(found.skipped),
+        "images": found.total,
         "used": len(found.used),
         "skipped": [str(path) for path in found.skipped],
+        "copies": [{"file": str(path), "of": str(first)} for path, first in found.copies],
         "rms_px": result.rms_px,
         "mean_px": result.mean_px,
         "camera_matrix": camera.matrix.tolist(),
@@ -186,13 +158,12 @@ def _numbers(model: str, found: BoardImages, result: Calibration, seconds: float
     }
 
 
-def _show(numbers: dict[str, Any], found: BoardImages, result: Calibration) -> None:
+def _show(numbers: dict[str, Any], result: Calibration) -> None:
     from vslam_ref.commands.tables import table
 
     rows = [[str(one["file"]), f"{one['rms_px']:.4f}"] for one in numbers["per_image"]]
     print(table(["image", "rms [px]"], rows))
-    for path in found.skipped:
-        print(f"{path}: no board found, left out")
+    print_notes(numbers["notes"])
     print()
     values, std = numbers["parameters"], numbers["std"]
     unit = dict.fromkeys(("fx", "fy", "cx", "cy"), "px") | {"omega": "rad"}

@@ -31,7 +31,8 @@ SYSTEMS = {"ptam": "PTAM: a path and a map of points from the pictures of one mo
 EPILOG = """\
 SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, the
 name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where
-no camera lies beside the pictures, give --camera: any camera file that this library reads, or one line
+no camera lies beside the pictures, give --camera, a file whose kind is seen from its content: OpenCV (YAML,
+XML, JSON), ROS camera_info, ORB-SLAM's settings, Kalibr, EuRoC, KITTI, PTAM, TUM monoVO, or one line
 'fx fy cx cy width height'.
 
 numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final

@@ -132,7 +132,23 @@ def _tiff(data: bytes) -> tuple[int, int] | None:
     return (found[256], found[257]) if len(found) == 2 else None
 
 
+_BLANK = rb"(?:\s|#[^\n]*\n)+"
+
+
+def pnm_largest(data: bytes) -> int | None:
+    r"""The largest value of a binary PGM or PPM of 8 bits (P5, P6), as its head states it; None for others.
+
+    OpenCV's decoder does not look at it.
+
+    Examples
+    --------
+    >>> pnm_largest(b"P5\n640 480\n100\n"), pnm_largest(b"P2 1 1 100\n")
+    (100, None)
+    """
+    found = re.match(rb"P[56]" + (_BLANK + rb"\d{1,18}") * 2 + _BLANK + rb"(\d{1,3})\s", data)
+    return int(found[1]) if found and 0 < int(found[1]) <= 255 else None
+
+
 def _pnm(data: bytes) -> tuple[int, int] | None:
-    blank = rb"(?:\s|#[^\n]*\n)+"
-    found = re.match(rb"P[1-6]" + blank + rb"(\d{1,18})" + blank + rb"(\d{1,18})(?=\s)", data)
+    found = re.match(rb"P[1-6]" + _BLANK + rb"(\d{1,18})" + _BLANK + rb"(\d{1,18})(?=\s)", data)
     return (int(found[1]), int(found[2])) if found else None

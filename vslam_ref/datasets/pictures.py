@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vslam_ref.datasets.picture_size import require_size
+from vslam_ref.arrays import Array
+from vslam_ref.datasets.picture_size import pnm_largest, require_size
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.support.files import write_bytes
 
@@ -106,6 +107,43 @@ def read_picture(path: Path | str) -> Picture:
     if bits == 16:
         values = ((values.astype(np.uint32) + 128) // 257).astype(np.uint8)  # 65535 becomes 255
     return from_opencv(values, bits)
+
+
+class Channels(NamedTuple):
+    """Values of a picture as they are stored.
+
+    Attributes
+    ----------
+    colours : ndarray, shape (H, W, 1 or 3)
+        0 to 255; values of 16 bits are divided by 257, those of a PGM with another largest value stretched.
+    opacity : ndarray, shape (H, W), or None
+        0 (transparent) to 255; None where the file has none.
+    """
+
+    colours: Array
+    opacity: Array | None
+
+
+def read_channels(path: Path | str) -> Channels:
+    """Read every channel of an image by itself, its opacity too.
+
+    Raises
+    ------
+    FormatError
+        As :func:`read_picture`.
+    """
+    import cv2
+
+    path = Path(path)
+    values = _decoded(path, cv2.IMREAD_UNCHANGED)
+    if values.dtype not in (np.uint8, np.uint16):
+        raise FormatError(path, None, f"values are {values.dtype}; expected whole ones of 8 or 16 bits")
+    scaled: Array = values.reshape(*values.shape[:2], -1) / (257.0 if values.dtype == np.uint16 else 1.0)
+    with path.open("rb") as stream:
+        largest = pnm_largest(stream.read(1000))
+    if values.dtype == np.uint8 and largest is not None:
+        scaled *= 255.0 / largest
+    return Channels(scaled[..., :3], scaled[..., 3]) if scaled.shape[2] == 4 else Channels(scaled, None)
 
 
 def from_opencv(values: NDArray[Any], bits: int = 8) -> Picture:

@@ -1,10 +1,13 @@
 """YAML files as trees of nodes that know their lines; nothing in them is ever constructed or executed.
 
 OpenCV begins its files with ``%YAML:1.0``, which no YAML standard knows; that line is taken as a comment.
+An alias (``*a``) costs nothing until a matrix is made of it, and a matrix has at most ``MOST_NUMBERS``: a
+small file cannot fill the memory.
 """
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -12,12 +15,16 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import FormatError, decoded, number
+from vslam_ref.datasets.text import FormatError, decoded, number, read_bytes
 
 T = TypeVar("T")
+HEADER, PACKED = 24, {"d": "<f8", "f": "<f4", "i": "<i4"}
+"""Of a matrix in base 64: bytes before the numbers, and the types that are read."""
 MAX_BYTES = 2**20
 LONGEST = 1e12
 """Calibration and map files are flat and short: what is larger is another kind of file."""
+MOST_NUMBERS = 4096
+"""Of a matrix: the largest that is read here has sixteen."""
 
 
 class Node(NamedTuple):
@@ -37,7 +44,7 @@ class Node(NamedTuple):
         return FormatError(self.path, self.line, what)
 
     def items(self) -> dict[str, Node]:
-        """Entries of a mapping, or FormatError; a key that stands twice is an error too."""
+        """Entries of a mapping, or FormatError; so is a key that stands twice, with another value."""
         if self.raw.id != "mapping":
             raise self.error(f"{self.name} is {_kind(self.raw)}; expected entries 'key: value'")
         found: dict[str, Node] = {}
@@ -45,9 +52,9 @@ class Node(NamedTuple):
             at = Node(self.path, str(key.value), value)
             if key.id != "scalar":
                 raise self.error(f"a key of {self.name} is {_kind(key)}; expected a word")
-            if key.value in found:
+            if key.value in found and not _same(found[key.value].raw, value):
                 raise Node(self.path, "", key).error(f"{key.value} again; expected it once")
-            found[key.value] = at
+            found.setdefault(key.value, at)
         return found
 
     def get(self, *names: str) -> Node:
@@ -98,6 +105,8 @@ class Node(NamedTuple):
     def vector(self, *lengths: int) -> Array:
         """Numbers of a list, whose length must be one of those given (any, if none is)."""
         elements = self.elements()
+        if len(elements) > MOST_NUMBERS:
+            raise self.error(f"{self.name} has {len(elements)} numbers; at most {MOST_NUMBERS} are read")
         if lengths and len(elements) not in lengths:
             right = " or ".join(map(str, lengths))
             raise self.error(f"{self.name} has {len(elements)} numbers; expected {right}")
@@ -106,15 +115,38 @@ class Node(NamedTuple):
     def matrix(self) -> Array:
         """Matrix given as rows, cols, data, with or without OpenCV's tag, or as a list of rows."""
         if self.raw.id == "sequence":
-            rows = [row.vector() for row in self.elements()]
+            elements = self.elements()
+            if len(elements) > MOST_NUMBERS**0.5:
+                raise self.error(f"{self.name} has {len(elements)} rows; expected a matrix of a few")
+            rows = [row.vector() for row in elements]
             if len({len(row) for row in rows}) != 1:
                 raise self.error(f"rows of {self.name} differ in length; expected a matrix")
             return np.array(rows)
         rows_, cols, data = self.get("rows").integer(0), self.get("cols").integer(0), self.get("data")
-        values = data.vector()
+        values = _packed(data) if data.raw.id == "scalar" else data.vector()
         if len(values) != rows_ * cols:
             raise data.error(f"{self.name} has {len(values)} numbers; expected {rows_} x {cols}")
         return values.reshape(rows_, cols)
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are the same word: such a line stands twice and says nothing new."""
+    return one.id == other.id == "scalar" and bool(one.value == other.value)
+
+
+def _packed(data: Node) -> Array:
+    """Numbers that OpenCV wrote in base 64: 24 letters say their type, then come their bytes."""
+    text = "".join(data.text().removeprefix("$base64$").split())
+    try:
+        content = base64.b64decode(text, validate=True)
+        kind = content[:HEADER].decode("ascii").strip().lstrip("1")
+        values = np.frombuffer(content[HEADER:], PACKED[kind])
+    except (ValueError, KeyError):
+        what = f"{data.name} is {data.text()!r}; expected a list of numbers, or OpenCV's base 64"
+        raise data.error(what) from None
+    if len(values) > MOST_NUMBERS or not np.isfinite(values).all():
+        raise data.error(f"{data.name}: expected at most {MOST_NUMBERS} numbers, all of them finite")
+    return values.astype(np.float64)
 
 
 def _kind(raw: Any) -> str:
@@ -129,11 +161,23 @@ def read_yaml(path: Path) -> Node:
     FormatError
         Where it cannot be read: no file, not text, too long, nested too deeply, or against YAML's grammar.
     """
+    return parse_yaml(path, plain_text(path, read_bytes(path, MAX_BYTES)))
+
+
+def parse_yaml(path: Path, text: str) -> Node:
+    """Parse a text with one YAML document; an end ``---`` with nothing behind it is allowed.
+
+    Raises
+    ------
+    FormatError
+        As :func:`read_yaml`.
+    """
     import yaml
 
-    text = _read_text(path)
     try:
-        raw = yaml.compose(text, Loader=yaml.SafeLoader)
+        documents = yaml.compose_all(text, Loader=yaml.SafeLoader)
+        raw = next(documents, None)
+        after = next((one for one in documents if one is not None and one.value), None)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"{error.problem or error.context}; expected YAML"
@@ -144,6 +188,9 @@ def read_yaml(path: Path) -> Node:
         raise FormatError(path, None, _one_line(f"{error}; expected YAML")) from None
     if raw is None:
         raise FormatError(path, None, "empty; expected YAML")
+    if after is not None:
+        what = "another document begins (---); expected one"
+        raise FormatError(path, int(after.start_mark.line) + 1, what)
     return Node(path, "the file", raw)
 
 
@@ -151,14 +198,8 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _read_text(path: Path) -> str:
+def plain_text(path: Path, data: bytes) -> str:
     """The file's text, its first line made a comment if it names a YAML version."""
-    if not path.is_file():
-        raise FormatError(path, None, "no such file")
-    with path.open("rb") as stream:
-        data = stream.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise FormatError(path, None, f"more than {MAX_BYTES} bytes; is this the right file?")
     text = decoded(path, data)
     return "#" + text[1:] if text.startswith("%YAML") else text
 

@@ -3,19 +3,25 @@
 =====================  ==========================================  =========================================
 module                 reads                                       converts
 =====================  ==========================================  =========================================
-``opencv_yaml``        OpenCV's FileStorage YAML (3 to 5)          nothing; it also writes
-``kalibr``             Kalibr's camchain                           nothing
+``opencv_storage``     OpenCV's FileStorage: YAML, XML, JSON,      nothing; it also writes YAML
+                       plain or packed
+``camera_info``        messages of ROS 1 and 2                     region of interest and binning
+``orbslam``            settings of ORB-SLAM 2 and 3, stella_vslam  the camera's pose in the body is inverted
+``kalibr``             Kalibr's camchain                           T_imu_cam is inverted, chains are followed
 ``euroc``              EuRoC's sensor.yaml                         T_BS (body from sensor) to ``T_cam_rig``
 ``ptam``               PTAM's camera.cfg                           relative numbers and the pixel origin
 ``tum_mono``           TUM monoVO's (DSO's) camera.txt             relative numbers and the pixel origin
 =====================  ==========================================  =========================================
 
+``lenses`` knows the names of lenses, and what to do where no camera here has such a one.
 Every reader answers with :class:`CameraFile`; every error is one line with file, line, and what is right.
 """
 
+from vslam_ref.datasets.calibration_files.camera_info import read_camera_info
 from vslam_ref.datasets.calibration_files.euroc import read_euroc
 from vslam_ref.datasets.calibration_files.kalibr import read_kalibr
-from vslam_ref.datasets.calibration_files.opencv_yaml import read_opencv, write_opencv
+from vslam_ref.datasets.calibration_files.opencv_storage import read_opencv, write_opencv
+from vslam_ref.datasets.calibration_files.orbslam import read_orbslam
 from vslam_ref.datasets.calibration_files.ptam import read_ptam
 from vslam_ref.datasets.calibration_files.record import CameraFile, pixels_from_relative
 from vslam_ref.datasets.calibration_files.tum_mono import TumMonoFile, read_tum_mono
@@ -24,9 +30,11 @@ __all__ = [
     "CameraFile",
     "TumMonoFile",
     "pixels_from_relative",
+    "read_camera_info",
     "read_euroc",
     "read_kalibr",
     "read_opencv",
+    "read_orbslam",
     "read_ptam",
     "read_tum_mono",
     "write_opencv",

@@ -26,6 +26,8 @@ class CameraFile:
     std : tuple of float, or None
         Standard deviation of each of the camera's ``params``, 0 for what was not estimated; None where the
         file does not say.
+    notes : tuple of str
+        What is odd in the file and harmless, a sentence each.
     """
 
     camera: Camera
@@ -33,6 +35,7 @@ class CameraFile:
     T_cam_rig: Array | None = None
     name: str = ""
     std: tuple[float, ...] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def pixels_from_relative(relative: float, size: int, *, centre: bool) -> float:

@@ -7,7 +7,13 @@
     crop | full | none | fx fy cx cy 0      the pinhole camera that the images are rectified to
     width height               of the rectified images
 
-The first line may begin with the word ``FOV``, or with ``Pinhole`` and four numbers (a fifth must be 0).
+The first line may begin with a word that names the lens::
+
+    FOV fx fy cx cy omega
+    Pinhole fx fy cx cy                     a fifth number must be 0
+    RadTan fx fy cx cy k1 k2 p1 p2          eight numbers without a word mean this one
+    EquiDistant fx fy cx cy k1 k2 k3 k4     or KannalaBrandt
+
 Relative centres are counted from the image's outer edge, so half a pixel is subtracted; absolute ones are
 taken as they are, whole numbers at centres of pixels.
 """
@@ -19,9 +25,16 @@ from typing import NamedTuple
 
 from vslam_ref.datasets.calibration_files.record import CameraFile, relative_sensor
 from vslam_ref.datasets.text import FormatError, number, read_lines
-from vslam_ref.geometry.cameras import Camera, Fov, Pinhole
+from vslam_ref.geometry.cameras import Camera, Fisheye, Fov, Pinhole, Radtan
 
-NAMES = ("fx", "fy", "cx", "cy", "omega")
+LENSES: dict[str, tuple[type[Camera], tuple[str, ...]]] = {
+    "fov": (Fov, ("omega",)),
+    "pinhole": (Pinhole, ("omega",)),
+    "radtan": (Radtan, ("k1", "k2", "p1", "p2")),
+    "equidistant": (Fisheye, ("k1", "k2", "k3", "k4")),
+    "kannalabrandt": (Fisheye, ("k1", "k2", "k3", "k4")),
+}
+SENSOR = ("fx", "fy", "cx", "cy")
 WORDS = ("crop", "full", "none")
 LINES = "camera, size, crop | full | none | fx fy cx cy 0, size"
 
@@ -64,18 +77,22 @@ def read_tum_mono(path: Path | str) -> TumMonoFile:
 
 def _camera(path: Path, line: int, text: str, size: tuple[int, int]) -> Camera:
     words = text.split()
-    kind = words.pop(0).lower() if words[0].isalpha() else "fov"
-    if kind not in ("fov", "pinhole"):
-        raise FormatError(path, line, f"lens {kind!r}; expected FOV, Pinhole, or five numbers")
-    if len(words) not in ((5,) if kind == "fov" else (4, 5)):
-        raise FormatError(path, line, f"{len(words)} numbers; expected 5: {' '.join(NAMES)}")
-    values = [number(path, line, word, name) for word, name in zip(words, NAMES, strict=False)]
+    kind = words.pop(0).lower() if words[0].isalpha() else "radtan" if len(words) == 8 else "fov"
+    if kind not in LENSES:
+        raise FormatError(
+            path, line, f"lens {kind!r}; expected FOV, Pinhole, RadTan, EquiDistant, or numbers"
+        )
+    make, lens = LENSES[kind]
+    names = (*SENSOR, *lens)
+    if len(words) != len(names) and not (kind == "pinhole" and len(words) == 4):
+        raise FormatError(path, line, f"{len(words)} numbers; expected {len(names)}: {' '.join(names)}")
+    values = [number(path, line, word, name) for word, name in zip(words, names, strict=False)]
     sensor = values[:4]
     if values[2] < 1 and values[3] < 1:
         sensor = relative_sensor(sensor, size)
     try:
-        if kind == "fov":
-            return Fov.from_params([*sensor, values[4]])
+        if kind != "pinhole":
+            return make.from_params([*sensor, *values[4:], *[0.0] * (make is Radtan)])
         if values[4:] not in ([], [0.0]):
             raise ValueError(f"omega is {values[4]:g}; expected 0 for a pinhole")
         return Pinhole(*sensor)

@@ -9,27 +9,30 @@ Beside the kinds of :mod:`vslam_ref.datasets.calibration_files` there are two sh
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.datasets.calibration_files import (
-    CameraFile,
-    read_euroc,
-    read_kalibr,
-    read_opencv,
-    read_ptam,
-    read_tum_mono,
-)
+from vslam_ref.datasets.calibration_files import CameraFile, read_camera_info, read_ptam, read_tum_mono
+from vslam_ref.datasets.calibration_files.camera_info import from_message
+from vslam_ref.datasets.calibration_files.euroc import from_sensor
+from vslam_ref.datasets.calibration_files.kalibr import from_chain
+from vslam_ref.datasets.calibration_files.opencv_storage import from_entries
+from vslam_ref.datasets.calibration_files.orbslam import from_settings
 from vslam_ref.datasets.calibration_files.ptam import VARIABLE
-from vslam_ref.datasets.text import FormatError, number, numbers, read_lines
+from vslam_ref.datasets.storage_nodes import GZIP, parse_storage, storage_bytes
+from vslam_ref.datasets.text import FormatError, decoded, number, numbers, read_bytes, read_lines
+from vslam_ref.datasets.yaml_nodes import Node
 from vslam_ref.geometry.cameras import Pinhole
 
 PLAIN = ("fx", "fy", "cx", "cy", "width", "height")
 KINDS = (
-    "calib.txt (fx fy cx cy width height), KITTI's calib.txt, OpenCV, Kalibr, EuRoC, PTAM's camera.cfg, "
-    "TUM monoVO's camera.txt"
+    "calib.txt (fx fy cx cy width height), KITTI's calib.txt, OpenCV (YAML, XML, JSON), ROS camera_info, "
+    "ORB-SLAM's settings, Kalibr, EuRoC, PTAM's camera.cfg, TUM monoVO's camera.txt"
 )
+MESSAGE = {"k", "d", "distortion_model"}
+"""Entries of a ROS message, in small letters."""
 KITTI = "P0"
 MAX_BYTES = 2**20
 LONGEST_SIDE = 2**20
@@ -65,24 +68,54 @@ def read_camera(path: Path, size: tuple[int, int]) -> CameraFile:
 
 
 def _by_content(path: Path, size: tuple[int, int]) -> CameraFile:
-    lines = list(read_lines(path, MAX_BYTES))
+    begin = _begin(path)
+    if begin.startswith((b"<", b"{", b"[")):
+        return _parsed(parse_storage(path, storage_bytes(path)))
+    keys = set(re.findall(r"^([A-Za-z_][\w.]*)[ \t]*:", begin.decode("utf-8", "replace"), re.MULTILINE))
+    if MESSAGE.issubset(key.lower() for key in keys):
+        return read_camera_info(path)
+    lines = list(_lines(path))
     if any(text.startswith(VARIABLE) for _, text in lines):
         return read_ptam(path, size)
-    keys = {match[1] for _, text in lines if (match := re.match(r"([A-Za-z_]\w*)\s*:", text))}
     if KITTI in keys:
         return read_kitti_camera(path)
-    if "cam0" in keys:
-        return read_kalibr(path)[0]
-    if "sensor_type" in keys:
-        return read_euroc(path)
     if keys:
-        return read_opencv(path)
+        return _parsed(parse_storage(path, storage_bytes(path)))
     if len(lines) == 1 and len(lines[0][1].split()) in (4, 6):
         return read_plain_camera(path)
     if len(lines) == 4:
         return read_tum_mono(path).recorded
     line = lines[0][0] if lines else None
     raise FormatError(path, line, f"no camera file that is known here; expected one of {KINDS}")
+
+
+def _parsed(top: Node) -> CameraFile:
+    """The camera of a file of entries, whose names tell the kind."""
+    keys = top.items()
+    if MESSAGE.issubset(key.lower() for key in keys):
+        return from_message(top)
+    if "Camera" in keys or any(key.startswith(("Camera.", "Camera1.")) for key in keys):
+        return from_settings(top)
+    if any(re.fullmatch(r"cam\d", key) for key in keys):
+        return from_chain(top)[0]
+    if "sensor_type" in keys or "T_BS" in keys:
+        return from_sensor(top)
+    return from_entries(top)
+
+
+def _begin(path: Path) -> bytes:
+    """The file's first bytes, unpacked if it is packed, without a byte order mark and blanks before."""
+    data = read_bytes(path, MAX_BYTES, whole=False)
+    data = storage_bytes(path) if data.startswith(GZIP) else data
+    return data.removeprefix(b"\xef\xbb\xbf").lstrip()
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Numbers and texts of the lines that say something."""
+    for number_, text in enumerate(decoded(path, storage_bytes(path)).splitlines(), 1):
+        stripped = text.strip()
+        if stripped and not stripped.startswith("#"):
+            yield number_, stripped
 
 
 def read_plain_camera(path: Path) -> CameraFile:

@@ -131,16 +131,16 @@ def _folder(folder: Path, options: Wanted) -> Sequence:
             raise MissingPictureError(path, None, "no such file")
         return read_picture(path)
 
-    camera, camera_from = _camera(options, size, found.camera, folder)
+    camera, camera_from, odd_camera = _camera(options, size, found.camera, folder)
     taken = Taken(str(folder), size, len(found.pictures), picture, camera, camera_from)
-    return _joined(taken, found, options, (DEEP,) if bits == 16 else ())
+    return _joined(taken, found, options, (*((DEEP,) if bits == 16 else ()), *odd_camera))
 
 
 def _film(path: Path, options: Wanted) -> Sequence:
     film = VideoFile(path)
-    camera, camera_from = _camera(options, film.size, None, path)
+    camera, camera_from, odd_camera = _camera(options, film.size, None, path)
     taken = Taken(str(path), film.size, len(film.times), film.picture, camera, camera_from)
-    return _joined(taken, Contents("video", (), film.times), options, film.notes)
+    return _joined(taken, Contents("video", (), film.times), options, (*film.notes, *odd_camera))
 
 
 def _rendered(source: str, options: Wanted) -> Sequence:
@@ -208,15 +208,16 @@ def _look(folder: Path, pictures: tuple[Path, ...]) -> tuple[tuple[int, int], in
 
 def _camera(
     options: Wanted, size: tuple[int, int], own: Path | None, source: Path
-) -> tuple[Camera | None, str]:
-    """The camera that was given, else the source's own; and where it comes from."""
+) -> tuple[Camera | None, str, tuple[str, ...]]:
+    """The camera that was given, else the source's own; where it comes from, and what is odd about it."""
     if isinstance(options.camera, Camera):
-        return options.camera, "given"
+        return options.camera, "given", ()
     path = options.camera or own
     if path is not None:
-        return read_camera(path, size).camera, str(path)
+        read = read_camera(path, size)
+        return read.camera, str(path), tuple(f"{path.name}: {note}" for note in read.notes)
     if not options.camera_needed:
-        return None, ""
+        return None, "", ()
     what = f"{source}: no camera beside the pictures, and none was given"
     raise InputError(f"{what}: give --camera FILE; it may be {KINDS}")
 

@@ -28,6 +28,7 @@ from vslam_ref.estimation.calibration.result import Calibration, tilt
 from vslam_ref.estimation.calibration.robustly import RobustCalibration, calibrate_robustly
 from vslam_ref.estimation.calibration.solver import calibrate
 from vslam_ref.estimation.calibration.start import Start, find_start, poses_for
+from vslam_ref.estimation.calibration.weakness import doubts, picture_uncertainty
 from vslam_ref.estimation.calibration.zhang import Sensor, pose_from_homography, sensor_from_homographies
 
 __all__ = [
@@ -45,8 +46,10 @@ __all__ = [
     "book",
     "calibrate",
     "calibrate_robustly",
+    "doubts",
     "find_start",
     "homography",
+    "picture_uncertainty",
     "pose_from_homography",
     "poses_for",
     "ptam",

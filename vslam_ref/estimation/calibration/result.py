@@ -13,6 +13,7 @@ from vslam_ref.estimation.calibration.board import BoardCorners
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import CalibrationIterate
 from vslam_ref.estimation.calibration.start import Start
+from vslam_ref.estimation.calibration.weakness import LARGEST_SHARE
 from vslam_ref.estimation.least_squares import Iteration
 from vslam_ref.estimation.least_squares.result import CONVERGED, Reason
 from vslam_ref.estimation.robust import norm_scale
@@ -20,12 +21,6 @@ from vslam_ref.geometry.cameras import Camera
 
 LEAST_EIGENVALUE = 1e-12
 """Of the reduced system, its diagonal scaled to 1: below, rounding of sums of thousands of terms decides."""
-
-LARGEST_SHARE = 0.05
-"""A focal length whose standard deviation is more than this share of it counts as not determined; likewise a
-principal point, in shares of the focal length."""
-
-FLAT_TILT = np.radians(5.0)
 
 
 @dataclass(frozen=True)
@@ -173,7 +168,8 @@ def certainty(point: CalibrationIterate, free: Free) -> Certainty:
     values, vectors = np.linalg.eigh(reduced.S / np.outer(scale, scale))
     if values[0] <= LEAST_EIGENVALUE:
         lost = [n for n, v in zip(free.names, vectors[:, 0], strict=True) if abs(v) > 0.1]
-        return Certainty(sigma, None, f"{', '.join(lost)}: a combination is not measured{_flat(point)}")
+        what = f"{', '.join(lost)}: a combination is not measured (standard deviation: infinite)"
+        return Certainty(sigma, None, what)
     if not np.isfinite(sigma):
         return Certainty(sigma, None, f"{2 * len(point.residual)} numbers for as many unknowns")
     root = vectors / np.sqrt(values)
@@ -189,24 +185,8 @@ def _vague(point: CalibrationIterate, cov: Array) -> str:
     lost = [i for i in range(4) if share[i] > LARGEST_SHARE]
     if not lost:
         return ""
-    groups = ", ".join(
+    return ", ".join(
         f"{name} = {point.state.params[i]:.6g} +- {deviation[i]:.3g}"
         for i, name in enumerate(("fx", "fy", "cx", "cy"))
         if i in lost
-    )
-    return f"{groups}{_flat(point)}"
-
-
-def _flat(point: CalibrationIterate) -> str:
-    """Why the sensor is not determined, where the boards' directions show it."""
-    T = point.state.T_cam_board
-    largest = float(tilt(T).max())
-    if largest > FLAT_TILT:
-        apart = np.arccos(np.clip(T[:, :3, 2] @ T[0, :3, 2], -1.0, 1.0))
-        alike = len(T) > 1 and float(apart.max()) < FLAT_TILT
-        return "; all boards are nearly parallel to each other, and count as one view" if alike else ""
-    return (
-        "; all boards are nearly parallel to the image plane "
-        f"(largest tilt {np.degrees(largest):.2g} degrees), "
-        "where a longer focal length looks like a greater distance: tilt the board by 30 to 45 degrees"
     )

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 from vslam_ref.estimation.calibration.board import BoardCorners, stack
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import CalibrationIterate, CalibrationProblem
-from vslam_ref.estimation.calibration.result import Calibration, certainty
+from vslam_ref.estimation.calibration.result import Calibration, Certainty, certainty
 from vslam_ref.estimation.calibration.start import Start, find_start, state_of
+from vslam_ref.estimation.calibration.weakness import counts_as_one, regular_point, sensor_causes
 from vslam_ref.estimation.least_squares import Descent, Options, descend
+from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.estimation.robust import L2, Loss
 from vslam_ref.geometry.cameras import MODELS
 
@@ -99,10 +101,12 @@ def calibrate(
         raise ValueError("start: its camera does not see every corner at these poses")
     # the cost of a fit without errors goes to zero, and no share of it is small: only rounding ends it
     end = descend(problem, here, Options(step=STEP, cost=0.0, max_iterations=max_iterations))
-    return _result(corners, free, start, end)
+    return _result(corners, size, free, start, end)
 
 
-def _result(corners: BoardCorners, free: Free, start: Start, end: Descent[CalibrationIterate]) -> Calibration:
+def _result(
+    corners: BoardCorners, size: tuple[int, int], free: Free, start: Start, end: Descent[CalibrationIterate]
+) -> Calibration:
     sure = certainty(end.here, free)
     return Calibration(
         camera=free.model.from_params(end.here.state.params),
@@ -112,7 +116,7 @@ def _result(corners: BoardCorners, free: Free, start: Start, end: Descent[Calibr
         weights=end.here.weights,
         sigma_px=sure.sigma_px,
         covariance=sure.covariance,
-        undetermined=sure.undetermined,
+        undetermined=_undetermined(corners, size, free, sure, ended=end.reason in CONVERGED),
         free=free,
         start=start,
         reason=end.reason,
@@ -120,6 +124,24 @@ def _result(corners: BoardCorners, free: Free, start: Start, end: Descent[Calibr
         iterations=len(end.history),
         history=end.history,
     )
+
+
+def _undetermined(
+    corners: BoardCorners, size: tuple[int, int], free: Free, sure: Certainty, *, ended: bool
+) -> str:
+    """What is open, and why; judged where the sensor is a usual one if the fit found no minimum."""
+    if ended and not sure.undetermined:
+        return ""
+    regular = regular_point(corners, size, free)
+    if regular is None:
+        return sure.undetermined
+    there = certainty(regular.point, free).undetermined
+    if not ended and not there and counts_as_one(regular.boards, corners, free):
+        there = "fx, fy, cx, cy"
+    if not ended and not there:
+        return ""
+    what = sure.undetermined if ended else f"{there} (at a usual focal length; the search found no best one)"
+    return "; ".join([what, *sensor_causes(corners, regular.boards, free)])
 
 
 def _enough(corners: BoardCorners, free: Free) -> None:
