@@ -14,7 +14,13 @@ to its left part fixes sign and size.
 
 With the rotation known, the translation is the solution of the linear system :math:`N_b t = -N_b R X`.
 
-These are not optimal: they measure distances from rays, in the world's unit, and not pixels.
+**Far points.**  These equations measure distances from rays, in the world's unit, and not pixels.  An error of
+the rotation moves X off its ray by that angle times its distance: one point a thousand times as far as the
+others has a thousand times their say, and the translation serves it alone.  So what is more than ``FAR`` times
+as far as the points usually are counts by its direction only: its equations are divided by its distance, and
+the shape of the set is judged with such points drawn near.  Without far points nothing is weighted.
+
+What comes out is a start, and not optimal.
 """
 
 from __future__ import annotations
@@ -37,6 +43,14 @@ FLAT = 1e-3
 
 At this ratio the twelve numbers are known about a thousand times less well than the noise.
 """
+FAR = 10.0
+"""Distance from the middle of the points, in medians of these distances, beyond which a point is far.
+
+Up to there equations without weights find the pose (no trial of many refused); beyond, what a far point says of
+the translation is less than a tenth of what the others say.
+"""
+TRIED = 12
+"""Of so many points, spread from the nearest to the farthest, all triples are tried."""
 RANK = 1e-12
 """Second smallest singular value, as a share of the largest, below which the answer is not unique.
 
@@ -102,7 +116,8 @@ def resect_linear(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     -------
     LinearPose
         By :func:`planar_dlt` if the points are flatter than one in a thousand, by :func:`dlt` if there are
-        six and more; four or five are answered with the best pose of three of them.
+        six and more; four or five are answered with :func:`best_of_three`, and so is where these two find
+        no pose.
 
     Raises
     ------
@@ -111,9 +126,14 @@ def resect_linear(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     """
     b, X = _checked(bearings, X_world)
     _, extent, _, _ = _shape(X)
-    if extent[2] <= FLAT * extent[0]:
-        return planar_dlt(b, X)
-    return _best_of_three(b, X) if 4 <= len(X) <= 5 else dlt(b, X)
+    flat = bool(extent[2] <= FLAT * extent[0])
+    if not flat and 4 <= len(X) <= 5:
+        return best_of_three(b, X)
+    found = planar_dlt(b, X) if flat else dlt(b, X)
+    if found.state not in (PoseState.BEHIND, PoseState.NO_ROTATION, PoseState.AMBIGUOUS):
+        return found
+    other = best_of_three(b, X)
+    return other if other.ok else found
 
 
 def dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
@@ -139,7 +159,7 @@ def dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     if extent[2] <= 1e-7 * extent[0]:  # a power of it, and rounding, must differ
         return _failed(PoseState.COPLANAR, "dlt")
     x = np.concatenate([(X - middle) / size, np.ones((len(X), 1))], 1)
-    P, spread, unique = _smallest(b, x)
+    P, spread, unique = _smallest(b, x * nearness(X)[:, None])
     return _pose(b, X, P[:, :3], "dlt", spread) if unique else _failed(PoseState.AMBIGUOUS, "dlt", spread)
 
 
@@ -166,7 +186,7 @@ def planar_dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     if extent[2] > 0.1 * extent[0]:
         return _failed(PoseState.NOT_COPLANAR, "planar")
     x = np.concatenate([(X - middle) @ axes[:2].T / size, np.ones((len(X), 1))], 1)
-    H, spread, unique = _smallest(b, x)
+    H, spread, unique = _smallest(b, x * nearness(X)[:, None])
     if not unique:
         return _failed(PoseState.AMBIGUOUS, "planar", spread)
     # the third column as the others' cross product, at their length; the sign of both is the sign of H
@@ -209,9 +229,51 @@ def tilted_twin(T_cam_world: ArrayLike, X_world: ArrayLike) -> Array:
     return se3.from_rt(R, seat - R @ middle)
 
 
-def _best_of_three(b: Array, X: Array) -> LinearPose:
-    """Of the poses of all triples the one in which all points lie best on their rays, and in front."""
-    triples = np.array(list(combinations(range(len(X)), 3)))
+def nearness(X_world: ArrayLike) -> Array:
+    """Weights (N,) of the points' equations: 1, and for a far point the usual distance over its own.
+
+    Distances are those from the median point, and the usual one is their median; a point is far beyond
+    :data:`FAR` of it.
+
+    Parameters
+    ----------
+    X_world : array_like, shape (N, 3)
+
+    Examples
+    --------
+    >>> X = np.array([[0, 0, 4], [1, 0, 5], [0, 2, 5], [-1, 1, 5], [0, 0, 2005.0]])
+    >>> nearness(X)
+    array([1.   , 1.   , 1.   , 1.   , 0.0005])
+    """
+    X = as_array("X_world", X_world, 3)
+    if len(X) == 0:
+        return np.ones(0)
+    distance = np.linalg.norm(X - np.median(X, axis=0), axis=1)
+    usual = float(np.median(distance))
+    far = distance > FAR * usual
+    return np.where(far, usual / np.where(far, distance, 1.0), 1.0) if usual > 0 else np.ones(len(X))
+
+
+def best_of_three(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
+    """Of the poses of triples the one in which all points lie best on their rays, and in front.
+
+    Angles from rays are what is compared, so a far point counts as any other.  At most ``TRIED`` points
+    give triples.  Parameters, returns and errors as for :func:`resect_linear`; at least four points.
+
+    Examples
+    --------
+    >>> X = np.array([[0, 0, 4], [1, 0, 5], [0, 2, 6], [-100, 100, 5000.0]])
+    >>> best_of_three(X / np.linalg.norm(X, axis=1, keepdims=True), X).T_cam_world.round(6) + 0.0
+    array([[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.], [0., 0., 0., 1.]])
+    """
+    b, X = _checked(bearings, X_world)
+    if len(X) < 4:
+        return _failed(PoseState.TOO_FEW, "p3p")
+    tried = np.arange(len(X))
+    if len(X) > TRIED:
+        order = np.argsort(np.linalg.norm(X - np.median(X, axis=0), axis=1), kind="stable")
+        tried = order[np.linspace(0, len(X) - 1, TRIED).round().astype(int)]
+    triples = np.array(list(combinations(tried.tolist(), 3)))
     found = p3p(b[triples], X[triples])
     poses = found.T_cam_world[found.valid]
     X_cam = se3.act(poses[:, None], X)
@@ -240,7 +302,7 @@ def _pose(b: Array, X: Array, M: Array, method: str, spread: float) -> LinearPos
         R = nearest_rotation(sign * M).R
     except ValueError:
         return _failed(PoseState.NO_ROTATION, method, spread)
-    N = across(b)
+    N = across(b) * nearness(X)[:, None, None]
     t = np.linalg.lstsq(N.reshape(-1, 3), -np.einsum("nij,nj->ni", N, X @ R.T).ravel(), rcond=None)[0]
     T = se3.from_rt(R, t)
     behind = bool((np.sum(b * se3.act(T, X), axis=1) <= 0).any())
@@ -254,11 +316,15 @@ def _in_front(pose: LinearPose, b: Array, X: Array) -> int:
 
 
 def _shape(X: Array) -> tuple[Array, Array, Array, float]:
-    """Middle, extents along three axes (falling), the axes (rows), and the root mean square distance."""
+    """Middle, extents along three axes (falling), the axes (rows), and the root mean square distance.
+
+    A far point is drawn near, towards the middle of the others: it leaves neither their plane nor their line.
+    """
     if len(X) == 0:
         return np.zeros(3), np.zeros(3), np.eye(3), 1.0
-    middle = X.mean(axis=0)
-    _, s, axes = np.linalg.svd(X - middle, full_matrices=True)
+    weight = nearness(X)
+    middle = X[weight == 1.0].mean(axis=0)
+    _, s, axes = np.linalg.svd((X - middle) * weight[:, None], full_matrices=True)
     axes[2] = np.cross(axes[0], axes[1])  # right-handed
     extent = np.pad(s, (0, 3 - len(s))) / np.sqrt(len(X))
     rounding = 8 * np.finfo(np.float64).eps * float(np.abs(X).max())
