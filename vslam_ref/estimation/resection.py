@@ -21,12 +21,9 @@ from vslam_ref.estimation.least_squares import Options, Solution, minimise
 from vslam_ref.estimation.robust import Loss, norm_scale, tuned
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera, Projection, WorldProjectionJacobians
-from vslam_ref.geometry.multiview.resection import (
-    best_of_three,
-    nearness,
-    resect_linear,
-    tilted_twin,
-)
+from vslam_ref.geometry.multiview.point_shape import nearness
+from vslam_ref.geometry.multiview.resection import resect_linear, tilted_twin
+from vslam_ref.geometry.multiview.triples import best_of_three
 
 
 @dataclass(frozen=True)
