@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
 from vslam_ref.estimation.resection import Resection, refine_pose, resect
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Pinhole
-from vslam_ref.geometry.multiview import best_of_three, dlt, nearness, planar_dlt, resect_linear
+from vslam_ref.geometry.multiview import best_of_three, dlt, nearness, p3p, planar_dlt, resect_linear
 
 LENS = Pinhole(500.0, 520.0, 320.0, 240.0)
 SIGMA = 0.5
@@ -116,15 +118,57 @@ def test_near_points_of_a_plane_with_one_far_point_beside_it() -> None:
 def test_weights_are_one_without_far_points() -> None:
     """So nothing changes for them, not even the rounding."""
     rng = np.random.default_rng(7)
-    for count in (0, 1, 2, 6, 50):
+    for count in (0, 1, 2, 3, 6, 50, 1000):
         assert (nearness(rng.uniform(-1, 1, (count, 3))) == 1.0).all()
-    X = rng.uniform(-1, 1, (9, 3))
-    X[4] = [3e3, 0, 0]
+    assert (nearness(np.zeros((5, 3))) == 1.0).all()  # one place
+    assert (nearness(1e6 * rng.uniform(-1, 1, (30, 3)) + 1e8) == 1.0).all()  # neither unit nor origin matter
+
+
+@pytest.mark.parametrize(("count", "far"), [(6, 1), (6, 3), (9, 6), (600, 300)])
+def test_weights_of_far_points_are_ratios_of_distances(count: int, far: int) -> None:
+    rng = np.random.default_rng(8)
+    X = rng.uniform(-1, 1, (count, 3))
+    X[:far] = 1e5 * (X[:far] / np.linalg.norm(X[:far], axis=1, keepdims=True))
     weight = nearness(X)
-    assert (np.delete(weight, 4) == 1.0).all()
-    d = np.linalg.norm(X - np.median(X, axis=0), axis=1)
-    assert weight[4] == pytest.approx(np.median(d) / d[4])
-    assert (nearness(np.tile(X[:1], (5, 1))) == 1.0).all()  # one place
+    assert (weight[far:] == 1.0).all()
+    # from any point of the box the far ones are 1e5 away, and its third has a radius between 0.1 and 2 sqrt 3
+    assert (weight[:far] > 0.09e-5).all()
+    assert (weight[:far] < 3.5e-5).all()
+    assert np.ptp(weight[:far]) < 1e-4 * weight[0]
+    np.testing.assert_allclose(nearness(1e-3 * X + [5.0, 0, 0]), weight, rtol=1e-9)
+
+
+def test_the_rotation_is_as_good_as_from_the_near_points() -> None:
+    """Or better, as far points are the best compass; unweighted equations serve them and nothing else."""
+    rng = np.random.default_rng(9)
+    for method, flat in ((dlt, False), (planar_dlt, True)):
+        turns = []
+        for _ in range(40):
+            T, X, uv = view(20, 2, 1e6, rng, flat)
+            b = LENS.unproject(uv + rng.normal(0, SIGMA, uv.shape)).bearing
+            found = [method(b, X), method(b[2:], X[2:])]
+            turns.append([np.linalg.norm(so3.log(se3.rotation(f.T_cam_world) @ T[:3, :3].T)) for f in found])
+        with_far, without = np.sqrt(np.mean(np.square(turns), axis=0))
+        assert with_far < 1.2 * without, (method.__name__, with_far, without)
+
+
+def test_the_best_of_three_is_the_best_by_angle() -> None:
+    """Pixels are the oracle: of the poses of all triples it is among the best, far point or not."""
+    rng = np.random.default_rng(10)
+    ratio = []
+    for _ in range(30):
+        _, X, uv = view(7, 1, 1e6, rng)
+        uv = uv + rng.normal(0, SIGMA, uv.shape)
+        b = LENS.unproject(uv).bearing
+        triples = np.array(list(combinations(range(7), 3)))
+        found = p3p(b[triples], X[triples])
+        off = []
+        for T in [best_of_three(b, X).T_cam_world, *found.T_cam_world[found.valid]]:
+            at = LENS.pixel_from_world(T, X)
+            off.append(np.inf if not at.valid.all() else float(np.linalg.norm(at.uv - uv)))
+        ratio.append(off[0] / min(off[1:]))
+    # an angle and a pixel differ by cos^2 at most, 0.6 in the corner of this picture
+    assert max(ratio) < 1 / 0.6
 
 
 def test_too_few_points_for_the_best_of_three() -> None:

@@ -21,9 +21,7 @@ from vslam_ref.estimation.least_squares import Options, Solution, minimise
 from vslam_ref.estimation.robust import Loss, norm_scale, tuned
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera, Projection, WorldProjectionJacobians
-from vslam_ref.geometry.multiview.point_shape import nearness
 from vslam_ref.geometry.multiview.resection import resect_linear, tilted_twin
-from vslam_ref.geometry.multiview.triples import best_of_three
 
 
 @dataclass(frozen=True)
@@ -171,7 +169,6 @@ def resect(
     Parameters, returns and errors as for :func:`refine_pose`.  The linear start uses all points; where many
     are wrong, choose a start from a few of them instead.  Points of a plane have two valleys: the search
     begins in both (:func:`~vslam_ref.geometry.multiview.resection.tilted_twin`), and the deeper one counts.
-    Where a few points are far beyond the others, the best pose of three points is a second start.
 
     Examples
     --------
@@ -193,9 +190,6 @@ def resect(
     starts = [start.T_cam_world]
     if start.method == "planar":
         starts.append(tilted_twin(start.T_cam_world, X))
-    if start.method != "p3p" and (nearness(X) < 1.0).any():
-        other = best_of_three(rays.bearing, X)
-        starts += [other.T_cam_world] if other.ok else []
     found = [refine_pose(camera, X, u, T, loss=loss, sigma_px=sigma_px, options=options) for T in starts]
     best, *others = sorted(found, key=_cost)
     return replace(best, rival=_rival(best, others))

@@ -14,19 +14,22 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array
 
-FAR = 10.0
-"""Distance from the middle of the points, in medians of these distances, beyond which a point is far.
+FAR = 20.0
+"""Distance from the centre of the densest third, in its radii, beyond which a point is far.
 
-Up to there the equations find the pose without weights; beyond, what a far point says of the translation is
-less than a tenth of what the others say.
+Points that are ten times as far from the camera as the others do no harm unweighted; beyond, what a far point
+says of the translation is less than a tenth of what the others say.
 """
+COMPARED = 200
+"""So many points at most are compared with each other to find the densest third."""
 
 
 def nearness(X_world: ArrayLike) -> Array:
     """Weights (N,) of the points' equations: 1, and for a far point the usual distance over its own.
 
-    Distances are those from the median point, and the usual one is their median; a point is far beyond
-    :data:`FAR` of it.
+    The *densest third* is the smallest ball around one of the points that holds a third of them (and three
+    at least): its centre and its radius are the middle and the usual distance.  So even where most points
+    are far it is the near ones that set the scale.
 
     Parameters
     ----------
@@ -34,15 +37,18 @@ def nearness(X_world: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> X = np.array([[0, 0, 4], [1, 0, 5], [0, 2, 5], [-1, 1, 5], [0, 0, 2005.0]])
+    >>> X = np.array([[0, 0, 5], [0, 3, 5], [0, -4, 5], [0, 0, 8], [0, 0, 2005.0]])
     >>> nearness(X)
-    array([1.   , 1.   , 1.   , 1.   , 0.0005])
+    array([1.    , 1.    , 1.    , 1.    , 0.0015])
     """
     X = as_array("X_world", X_world, 3)
-    if len(X) == 0:
-        return np.ones(0)
-    distance = np.linalg.norm(X - np.median(X, axis=0), axis=1)
-    usual = float(np.median(distance))
+    if len(X) < 4:
+        return np.ones(len(X))
+    some = X[np.linspace(0, len(X) - 1, min(len(X), COMPARED)).round().astype(int)]
+    apart = np.sort(np.linalg.norm(some[:, None] - some, axis=-1), axis=1)
+    reach = apart[:, max(2, -(-len(some) // 3) - 1)]  # the point itself is the first
+    usual = float(reach.min())
+    distance = np.linalg.norm(X - some[np.argmin(reach)], axis=1)
     far = distance > FAR * usual
     return np.where(far, usual / np.where(far, distance, 1.0), 1.0) if usual > 0 else np.ones(len(X))
 
