@@ -47,8 +47,8 @@ def test_what_is_far_from_orthonormal_is_refused(name: str, M: np.ndarray) -> No
 def test_a_scaled_rotation_is_a_similarity_and_no_rotation() -> None:
     R = so3.exp([0.3, -0.2, 0.5])
     for name in ("so3", "quaternion", "se3"):
-        for scale in (2.0, 0.5, 1.01):
-            with pytest.raises(ValueError, match="no rotation"):
+        for scale in (2.0, 0.5, 1.01, -3.0):
+            with pytest.raises(ValueError, match=r"is no rotation: R\^T R is"):
                 OF_SPACE[name](scale * R)
     np.testing.assert_allclose(sim3.log(motion(2.0 * R))[3:], [0.3, -0.2, 0.5, np.log(2.0)], atol=8 * EPS)
     with pytest.raises(ValueError, match="its scale is zero"):
@@ -70,6 +70,8 @@ def test_turns_of_the_plane_are_checked_too() -> None:
     with pytest.raises(ValueError, match="R is no rotation"):
         so2.log([[2.0, 0.0], [0.0, 2.0]])
     assert so2.log([[2.0, -0.1], [0.1, 2.0]], project=True) == pytest.approx(np.arctan2(0.2, 4.0), abs=EPS)
+    with pytest.raises(ValueError, match="nearest rotation undefined"):
+        so2.log(np.zeros((2, 2)), project=True)
     assert se2.log([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).shape == (3, 3)  # three poses
 
 
@@ -186,6 +188,9 @@ def test_one_pole_in_a_batch_is_enough_and_between_poles_all_is_well() -> None:
     for angle in (0.0, 3.0, 7.5, 11.0, 100.0, 2000.0):
         product = so3.left_jacobian_inverse(angle * AXIS) @ so3.left_jacobian(angle * AXIS)
         assert np.abs(product - np.eye(3)).max() < 64 * EPS * max(1.0, angle) ** 2
+        product = se2.left_jacobian_inverse([1.0, 2.0, angle]) @ se2.left_jacobian([1.0, 2.0, angle])
+        assert np.abs(product - np.eye(3)).max() < 64 * EPS * max(1.0, angle) ** 2
+    assert np.isfinite(se2.left_jacobian_inverse([1.0, 2.0, np.pi])).all()
     # a scale takes W's pole away
     W = sim3.w_matrix_inverse(2 * np.pi * AXIS, 0.5) @ sim3.w_matrix(2 * np.pi * AXIS, 0.5)
     assert np.abs(W - np.eye(3)).max() < 256 * EPS
