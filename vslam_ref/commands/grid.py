@@ -26,9 +26,9 @@ EPILOG = """\
 LOG is a log in CARMEN's text format, plain or '.gz', whose poses are known (a corrected log), or the name
 of one of the set carmen_2d, found through VSLAM_REF_DATA: intel, csail, aces, freiburg-079, edmonton, fhw.
 Its scans are FLASER lines, or ROBOTLASER1, or RAWLASER1 with the poses of ODOM.  The field of view is the
-file's where it tells one (ROBOTLASER1, RAWLASER1, PARAM laser_front_laser_fov), else that of a half circle for
-180, 181, 360 and 361 beams; another number of beams is taken for the likeliest scanner, with a note, and
-'--fov' tells the field of view.
+file's where it tells one (ROBOTLASER1, RAWLASER1, PARAM laser_front_laser_fov), else half a circle for 180,
+181, 360 and 361 beams; another number of beams is taken for the likeliest scanner, with a note, and '--fov'
+tells the field of view.
 
 numbers (also in --json): scans, stamps that do not move forward, beams by kind, cells looked at, mean entropy
 of the static map in bit per cell, cells that were ever dynamic, things that moved at least a metre,
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fov",
         type=field_of_view,
         metavar="DEGREES",
-        help="field of view of the laser, whatever the file says",
+        help="field of view, whatever the file says of it",
     )
     parser.add_argument(
         "--resolution", type=float, metavar="M", help="side of a cell in metres (default: 0.1)"

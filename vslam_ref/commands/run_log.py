@@ -11,6 +11,7 @@ from vslam_ref.commands.options import (
     folder_target,
     json_target,
     print_backend,
+    print_notes,
     warm,
     write_json,
 )
@@ -70,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
     seen, truth = content["sightings"], content["truth"] or "none"
     print(f"{source.log.name}: {seen} sightings of landmarks, truth: {truth}")
     print(table(heads, rows))
+    print_notes(content["notes"])
     print_backend()
     if out is not None:
         report.write_report(out, comparison, content)

@@ -63,7 +63,7 @@ def degrees(value: float, most: float = 2 * np.pi + 1e-3) -> float:
 
 
 def from_parameters(parameters: Mapping[str, str]) -> View | None:
-    """The view that lines such as ``PARAM laser_front_laser_fov 270`` tell; None where there is no such line."""
+    """The view that lines such as ``PARAM laser_front_laser_fov 270`` tell; None where there is none."""
     told: dict[str, float] = {}
     for name, text in parameters.items():
         found = PARAMETER.match(name)
