@@ -142,7 +142,7 @@ def test_lines_out_of_order_are_put_in_order_and_told(mrclam_folder: Path) -> No
     for name in ("Odometry", "Measurement", "Groundtruth"):
         path = mrclam_folder / f"Robot1_{name}.dat"
         head, *rows = path.read_text().splitlines()
-        rows = rows[1:2] + rows[:1] + rows[2:]
+        rows = rows[:1] + rows[2:3] + rows[1:2] + rows[3:]
         path.write_text("\n".join([head, *rows]))
     log = mrclam.read_log(mrclam_folder, 1)
     assert log.notes == tuple(

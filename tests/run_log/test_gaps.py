@@ -136,7 +136,7 @@ def test_stamps_that_stand_twice_do_no_harm() -> None:
 def test_the_filter_comes_back_from_a_gap(make_world, calibration) -> None:  # type: ignore[no-untyped-def]
     """The pose's standard deviation grows through a gap, and sightings after it are let in by the gate.
 
-    Six seconds: beyond ten, with turns to either side, a heading is in doubt by more than a filter linearises.
+    Six seconds: beyond ten, with turns to either side, the heading is in doubt by too much to linearise.
     """
     again = 46.0
     world = make_world("gap", calibration, seconds=120.0)
@@ -193,4 +193,4 @@ def test_the_command_tells_what_is_odd(
         "notes"
     ]
     assert "Robot1_Odometry.dat: 1 line(s) with an earlier time than a line before; put in order" in said[0]
-    assert "odometry: 1 gap(s) of more than 2 s, the longest 3.0 s" in said[1]
+    assert "odometry: 1 gap(s) of more than 2 s, the longest 3.1 s" in said[1]
