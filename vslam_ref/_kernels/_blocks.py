@@ -18,6 +18,8 @@ from vslam_ref._kernels._signature import njit
 
 TILE = 256
 """Columns at a time, so that their part of W stays in the fastest cache."""
+SINGULAR = 64 * 2.0**-52
+"""As in :mod:`vslam_ref.filters.block_covariance`."""
 
 
 def _as_contiguous(_, row):
@@ -73,6 +75,28 @@ def _cholesky(S, L):
             for q in range(j):
                 v -= L[i, q] * L[j, q]
             L[i, j] = v * f
+
+
+@njit(cache=True)
+def require_positive(S, L):
+    """Raise, as NumPy's form does, where a pivot of S is no more than rounding; L (k, k) is room."""
+    _cholesky(S, L)
+    for j in range(S.shape[0]):
+        if not SINGULAR * S[j, j] * L[j, j] * L[j, j] < 1.0:  # the diagonal of L holds inverses
+            raise np.linalg.LinAlgError("Matrix is not positive definite to rounding")
+
+
+@njit(cache=True)
+def only_seen(x_m, P_pm, P_mm, columns, x, P, Q):
+    """Mean x (k,), cross covariance P (p, k) and covariance Q (k, k) of the landmarks seen alone."""
+    for i in range(columns.shape[0]):
+        for r in range(2):
+            at, to = columns[i] + r, 2 * i + r
+            x[to] = x_m[at]
+            for q in range(P_pm.shape[0]):
+                P[q, to] = P_pm[q, at]
+            for j in range(columns.shape[0]):
+                Q[to, 2 * j], Q[to, 2 * j + 1] = P_mm[at, columns[j]], P_mm[at, columns[j] + 1]
 
 
 @njit(cache=True)

@@ -14,6 +14,8 @@ from vslam_ref._kernels._blocks import (
     in_one_piece,
     load_landmarks,
     load_tile,
+    only_seen,
+    require_positive,
     room_for_innovation,
     shrink_rows,
     whiten,
@@ -270,29 +272,51 @@ def _turn_pairs(c, columns, W, S):
             S[i, 2 * j], S[i, 2 * j + 1] = c.real * s - c.imag * t, c.imag * s + c.real * t
 
 
+@njit(cache=True)
+def _expect(x, P_pm, P, frame, columns, z, cov_z, NE, innovation, S, W):
+    """Innovation, S and the map's part of W of one run, whose pending noise is in P_pm and NE already."""
+    M, c, tau = x.shape[0], frame[0], frame[1]
+    load_landmarks(P_pm, P, columns, W)
+    for j in range(columns.shape[0]):
+        at = columns[j]
+        _add_noise(x[at], x[at + 1], NE, W[2 * j][:M], W[2 * j + 1][:M])
+        predicted = c * complex(x[at], x[at + 1]) - tau
+        innovation[2 * j] = z[j, 0] - predicted.real
+        innovation[2 * j + 1] = z[j, 1] - predicted.imag
+    _turn_pairs(c, columns, W, S)
+    W[:, M + 4] = innovation
+    add_noise(cov_z, S)
+
+
+@njit(cache=True)
+def _require_positive(x_m, P_pm, P_mm, P_a, frame, columns, z, cov_z, innovation, S):
+    """Raise before anything is changed where S is singular in one of the runs: landmarks seen are enough."""
+    k = 2 * columns.shape[0]
+    x, P, Q, L, W = np.empty(k), np.empty((4, k)), np.empty((k, k)), np.empty((k, k)), np.empty((k, k + 5))
+    E, NE, here = np.zeros((4, k)), np.empty((4, k)), np.arange(0, k, 2)
+    for b in range(x_m.shape[0]):
+        only_seen(x_m[b], P_pm[b], P_mm[b], columns, x, P, Q)
+        _noise_rows(x, 2, E)
+        _apply_to_pose(E, P, P_a[b], frame[b], NE)
+        _expect(x, P, Q, frame[b], here, z[b], cov_z, NE, innovation[b], S[b], W)
+        require_positive(S[b], L)
+
+
 @kernel(
     *(changed(2), changed(2), *_MAP[1:]),
     *(given(1, types.int64), given(3), given(3), types.float64, changed(2), changed(3)),
 )
 def _update_all(x_p, x_m, P_pm, P_mm, b, P_a, frame, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
+    _require_positive(x_m, P_pm, P_mm, P_a, frame, columns, z, cov_z, innovation, S)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 5)), np.empty((k, min(M, TILE)))
     E, NE, noise = np.zeros((4, M)), np.empty((4, M)), np.empty((4, min(M, TILE)))
     for run in range(x_p.shape[0]):
-        x, P, c, tau = x_m[run], P_mm[run], frame[run, 0], frame[run, 1]
+        x, P = x_m[run], P_mm[run]
         _noise_rows(x, b, E)
         _apply_to_pose(E, P_pm[run], P_a[run], frame[run], NE)
-        load_landmarks(P_pm[run], P, columns, W)
-        for j in range(columns.shape[0]):
-            at = columns[j]
-            _add_noise(x[at], x[at + 1], NE, W[2 * j][:M], W[2 * j + 1][:M])
-            predicted = c * complex(x[at], x[at + 1]) - tau
-            innovation[run, 2 * j] = z[run, j, 0] - predicted.real
-            innovation[run, 2 * j + 1] = z[run, j, 1] - predicted.imag
-        _turn_pairs(c, columns, W, S[run])
-        W[:, M + 4] = innovation[run]
-        add_noise(cov_z, S[run])
+        _expect(x, P_pm[run], P, frame[run], columns, z[run], cov_z, NE, innovation[run], S[run], W)
         whiten(S[run], L, W)
         apply_gate(gate, W)
         gain(W, x_p[run], x, P_a[run, :4, :4], P_pm[run])

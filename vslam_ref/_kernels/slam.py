@@ -13,6 +13,8 @@ from vslam_ref._kernels._blocks import (
     gain,
     in_one_piece,
     load_landmarks,
+    only_seen,
+    require_positive,
     room_for_innovation,
     shrink_map,
     whiten,
@@ -78,8 +80,8 @@ def _in_vehicle_frame(c, s, x_p, x_m, column):
 
 
 @njit(cache=True)
-def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, L, W, tile):
-    """Update one run, with H v = R^T (v_landmark - v_position) + (left, -ahead) v_heading."""
+def _expect(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S, W):
+    """Innovation, S and W of one run: H v = R^T (v_landmark - v_position) + (left, -ahead) v_heading."""
     M = x_m.shape[0]
     c, s = np.cos(x_p[2]), np.sin(x_p[2])
     X, Y, T = in_one_piece(P_pm[0]), in_one_piece(P_pm[1]), in_one_piece(P_pm[2])
@@ -105,11 +107,18 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, 
             S[a, 2 * j] = c * dx + s * dy + left * w[M + 2]
             S[a, 2 * j + 1] = c * dy - s * dx - ahead * w[M + 2]
     add_noise(cov_z, S)
-    whiten(S, L, W)
-    apply_gate(gate, W)
-    gain(W, x_p, x_m, P_pp, P_pm)
-    shrink_map(W, tile, P_mm)
-    x_p[2] = _wrap(x_p[2])
+
+
+@njit(cache=True)
+def _require_positive(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S):
+    """Raise before anything is changed where S is singular in one of the runs: landmarks seen are enough."""
+    k = 2 * columns.shape[0]
+    x, P, Q, L, W = np.empty(k), np.empty((3, k)), np.empty((k, k)), np.empty((k, k)), np.empty((k, k + 4))
+    here = np.arange(0, k, 2)
+    for b in range(x_p.shape[0]):
+        only_seen(x_m[b], P_pm[b], P_mm[b], columns, x, P, Q)
+        _expect(x_p[b], x, P_pp[b], P, Q, here, z[b], cov_z, innovation[b], S[b], W)
+        require_positive(S[b], L)
 
 
 @kernel(
@@ -118,11 +127,17 @@ def _update(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S, 
 )
 def _update_all(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, gate, innovation, S):
     check_rows(x_m, P_pm, P_mm)
+    _require_positive(x_p, x_m, P_pp, P_pm, P_mm, columns, z, cov_z, innovation, S)
     k, M = 2 * columns.shape[0], x_m.shape[1]
     L, W, tile = np.empty((k, k)), np.empty((k, M + 4)), np.empty((k, min(M, TILE)))
     for b in range(x_p.shape[0]):
-        room = innovation[b], S[b], L, W, tile
-        _update(x_p[b], x_m[b], P_pp[b], P_pm[b], P_mm[b], columns, z[b], cov_z, gate, *room)
+        x, P = x_m[b], P_mm[b]
+        _expect(x_p[b], x, P_pp[b], P_pm[b], P, columns, z[b], cov_z, innovation[b], S[b], W)
+        whiten(S[b], L, W)
+        apply_gate(gate, W)
+        gain(W, x_p[b], x, P_pp[b], P_pm[b])
+        shrink_map(W, tile, P)
+        x_p[b, 2] = _wrap(x_p[b, 2])
 
 
 @unpacks(_update_all)

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, json_target, print_backend, progress_bar, warm, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    json_target,
+    print_backend,
+    print_notes,
+    progress_bar,
+    warm,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.carmen import CarmenLog
@@ -14,9 +23,12 @@ if TYPE_CHECKING:
 
 HELP = "draw the static and the dynamic map of a laser log with known poses"
 EPILOG = """\
-LOG is a log in CARMEN's text format, plain or '.gz', whose FLASER poses are known (a corrected log), or
-the name of one of the set carmen_2d, found through VSLAM_REF_DATA: intel, csail, aces, freiburg-079,
-edmonton, fhw.
+LOG is a log in CARMEN's text format, plain or '.gz', whose poses are known (a corrected log), or the name
+of one of the set carmen_2d, found through VSLAM_REF_DATA: intel, csail, aces, freiburg-079, edmonton, fhw.
+Its scans are FLASER lines, or ROBOTLASER1, or RAWLASER1 with the poses of ODOM.  The field of view is the
+file's where it tells one (ROBOTLASER1, RAWLASER1, PARAM laser_front_laser_fov), else half a circle for 180,
+181, 360 and 361 beams; another number of beams is taken for the likeliest scanner, with a note, and '--fov'
+tells the field of view.
 
 numbers (also in --json): scans, stamps that do not move forward, beams by kind, cells looked at, mean entropy
 of the static map in bit per cell, cells that were ever dynamic, things that moved at least a metre,
@@ -37,6 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG", help="laser log; see below")
     parser.add_argument("--out", metavar="DIR", required=True, help="write maps, film and page there")
     parser.add_argument(
+        "--fov",
+        type=field_of_view,
+        metavar="DEGREES",
+        help="field of view, whatever the file says of it",
+    )
+    parser.add_argument(
         "--resolution", type=float, metavar="M", help="side of a cell in metres (default: 0.1)"
     )
     parser.add_argument(
@@ -49,6 +67,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="film: 320 pixels wide (small, the default), half or full size of the pictures, or none",
     )
     add_json(parser)
+
+
+def field_of_view(text: str) -> float:
+    """Read degrees, more than 0 and up to a full circle."""
+    try:
+        degrees = float(text)
+    except ValueError:
+        degrees = 0.0
+    if not 0 < degrees <= 360:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected degrees, more than 0 and up to 360")
+    return degrees
 
 
 def run(options: argparse.Namespace) -> int:
@@ -67,14 +96,16 @@ def run(options: argparse.Namespace) -> int:
     out = files.require_new_folder(options.out, "result.json")
     given = [] if options.resolution is None else [f"map.resolution={options.resolution!r}"]
     config = apply_overrides(GridConfig(), [*given, *options.set])
-    log = carmen.read(find_log(options.log))
+    fov = None if options.fov is None else math.radians(options.fov)
+    log = carmen.read(find_log(options.log), field_of_view=fov)
     warm("grids")
     with files.new_folder(out) as folder:
         mapped = draw(log, config, folder, options.video)
         content: dict[str, Any] = mapped.numbers() | {"backend": _kernels.backend()}
-        content |= {"config": config_to_dict(config), "versions": versions()}
+        content |= {"notes": list(log.notes), "config": config_to_dict(config), "versions": versions()}
         report.write_report(folder, mapped, content)
     print(table(["what", "value", "unit"], report.number_rows(content)))
+    print_notes(log.notes)
     print_backend()
     print(f"page: {out / 'report.html'}")
     write_json(target, content)

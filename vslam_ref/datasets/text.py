@@ -230,6 +230,16 @@ def require_order(table: Columns, column: int, *, strict: bool = False) -> None:
     )
 
 
+def sorted_by(table: Columns, column: int) -> tuple[Columns, int]:
+    """The rows in the order of their times, equal ones as they stand; how many stood behind a later one."""
+    times = table.values[:, column]
+    late = int(np.count_nonzero(times < np.maximum.accumulate(times)))
+    if not late:
+        return table, 0
+    order = np.argsort(times, kind="stable")
+    return Columns(table.path, table.values[order], table.lines[order]), late
+
+
 def require_integers(table: Columns, column: int, name: str) -> IntArray:
     """Return a column as integers, or raise :class:`FormatError` at the first that is not an integer."""
     values = table.values[:, column]

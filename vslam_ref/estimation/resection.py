@@ -250,7 +250,7 @@ def refine_pose_robust(
 def _rival(best: Resection, others: list[Resection]) -> float:
     """Cost of the next valley over the best one's; a turn of less than 1e-4 is the same valley."""
     for other in others:
-        turn = so3.log(se3.rotation(other.T_cam_world) @ se3.rotation(best.T_cam_world).T)
+        turn = so3.log_of_rotation(se3.rotation(other.T_cam_world) @ se3.rotation(best.T_cam_world).T)
         if np.isfinite(_cost(other)) and np.linalg.norm(turn) > 1e-4:
             return _cost(other) / _cost(best) if _cost(best) > 0 else np.inf
     return np.inf

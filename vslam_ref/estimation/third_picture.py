@@ -243,7 +243,7 @@ def _start(T: Array, a: Array, m: Array, b: Array, sigma: float, share: float) -
     depth = two_views.depths(T, a, b)[:, 0]
     w = np.where(np.isfinite(depth) & (depth > 0), 1.0 / np.where(depth == 0, 1.0, depth), 0.0)
     X = homogeneous(a) / np.maximum(w, FARTHEST)[:, None]
-    guess = se3.exp(share * se3.log(T))
+    guess = se3.exp(share * se3.log_of_motion(T))
     found = track_pose(Pinhole(1.0, 1.0, 0.0, 0.0), X, m, guess, sigma_px=sigma)
     return ThreeViews(T, found.T_cam_world, w, np.zeros(len(a)))
 

@@ -18,6 +18,12 @@ import numpy as np
 
 from vslam_ref.arrays import Array, IntArray
 
+SINGULAR = 64 * float(np.finfo(np.float64).eps)
+"""Pivot of S, as a share of its variance, up to which it is rounding and S singular.
+
+Adding, and subtracting again, a few numbers of the size of the variance leaves some eps of it.
+"""
+
 
 class State(NamedTuple):
     """Means and covariance blocks of B runs; a filter's steps change these arrays in place.
@@ -196,12 +202,12 @@ def kalman_update_in_place(state: State, seen: Expected, gate: float = np.inf) -
     Raises
     ------
     numpy.linalg.LinAlgError
-        If S is not positive definite.
+        If S is not positive definite to rounding in one of the runs; nothing is changed then.
     """
     x_p, x_m, P_pp, P_pm, P_mm = state
     p = x_p.shape[1]
     both = np.concatenate([seen.HP, seen.innovation[:, :, None]], 2)
-    both = np.linalg.inv(np.linalg.cholesky(seen.S)) @ both
+    both = np.linalg.inv(innovation_root(seen.S)) @ both
     if gate < np.inf:
         both[np.sum(both[:, :, -1] ** 2, 1) > gate] = 0.0
     W, y = both[:, :, :-1], both[:, :, -1:]
@@ -212,6 +218,21 @@ def kalman_update_in_place(state: State, seen: Expected, gate: float = np.inf) -
     P_pp -= WW[:, :p, :p]
     P_pm -= WW[:, :p, p:]
     P_mm -= WW[:, p:, p:]
+
+
+def innovation_root(S: Array) -> Array:
+    """Lower Cholesky factors of the covariances ``S (B, k, k)`` of an innovation.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a pivot, the part of a variance that the numbers before it leave open, is no more than
+        :data:`SINGULAR` of that variance: then it is rounding.
+    """
+    L = np.asarray(np.linalg.cholesky(S), dtype=np.float64)
+    if (np.einsum("bii->bi", L) ** 2 <= SINGULAR * np.einsum("bii->bi", S)).any():
+        raise np.linalg.LinAlgError("Matrix is not positive definite to rounding")
+    return L
 
 
 def expected_landmarks(

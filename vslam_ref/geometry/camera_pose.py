@@ -115,6 +115,6 @@ class DecayingVelocity(NamedTuple):
             raise ValueError(
                 f"decay={self.decay}, weight={self.weight}: need 0 <= decay <= 1 and 0 < weight <= 1"
             )
-        motion = se3.log(se3.compose(T_now, se3.inverse(T_before)))
+        motion = se3.log_of_motion(se3.compose(T_now, se3.inverse(T_before)))
         blend = (1.0 - self.weight) * self.velocity + self.weight * motion
         return self._replace(velocity=self.decay * blend)

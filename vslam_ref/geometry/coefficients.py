@@ -24,6 +24,9 @@ At 1 the closed forms have lost less than one digit of what is multiplied by the
 terms.
 """
 
+LOST = 1e4 * float(np.finfo(np.float64).eps)
+"""Length of an eigenvalue, relative to the largest, up to which its inverse has fewer than four digits."""
+
 _TERMS = 8  # the first one left out is q^8 4! / 20! < 1e-17 of the sum
 _POWERS = 19  # the first one left out is 190 / 21! < 4e-18, in C at theta = 0, sigma = 1
 
@@ -122,10 +125,38 @@ def inverse_coefficients(A: Array, B: Array, C: Array, theta2: Array) -> tuple[A
     ``A (...)``, ``B (...)``, ``C (...)``; ``theta2 (...)`` in rad^2.
 
     The matrix has the eigenvalues A and A - theta^2 C +- i theta B; D is the squared length of the latter.
+
+    Raises
+    ------
+    ValueError
+        Where D is so small that fewer than four digits are left: at a multiple of 2 pi, or less than 2e-12
+        of the angle from it, if there is no scale.
+
+    Notes
+    -----
+    For A = 1 the length of the latter is 2 sin(theta / 2) / theta, and p is found by taking numbers near 1
+    from each other, which leaves an error of eps (and the angle itself is not known better).  So the
+    inverse, 1 over that length, keeps four digits while the length is more than 1e4 eps.
     """
     p = A - theta2 * C
     D = p * p + theta2 * B * B
+    require_no_pole(D, A, theta2)
     return 1.0 / A, -B / D, (B * B - C * p) / (A * D)
+
+
+def require_no_pole(D: Array, A: Array, theta2: Array) -> None:
+    """Raise ValueError where a squared eigenvalue ``D (...)`` has lost its digits beside ``A (...)``.
+
+    ``theta2 (...)`` in rad^2, for the message.
+    """
+    poles = D <= (LOST * A) ** 2
+    if poles.any():
+        angle = float(np.sqrt(np.broadcast_to(theta2, poles.shape)[poles].flat[0]))
+        off = angle - 2.0 * np.pi * round(angle / (2.0 * np.pi))
+        raise ValueError(
+            f"the left Jacobian has no inverse at multiples of 2 pi: the angle {angle!r} rad "
+            f"is {off:.1g} rad off one"
+        )
 
 
 def rotation_polynomial(a: Array, b: Array, c: Array, Phi: Array) -> Array:

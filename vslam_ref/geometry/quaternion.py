@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry.coefficients import rotation_coefficients
+from vslam_ref.geometry.orthonormal import rotation_of
 
 
 def identity(shape: tuple[int, ...] = ()) -> Array:
@@ -83,18 +84,29 @@ def matrix(q: ArrayLike) -> Array:
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def from_matrix(R: ArrayLike) -> Array:
+def from_matrix(R: ArrayLike, *, project: bool = False) -> Array:
     """Quaternion of a rotation matrix, :func:`canonical`, shape (..., 3, 3) -> (..., 4).
 
-    The ten sums below are 4 q q^T.  Each row of it is q times one of q's own entries; the row of
-    the largest entry, which is at least 1/2, loses no digits at any angle.
+    Raises
+    ------
+    ValueError
+        If a matrix is no rotation up to rounding; with ``project`` the nearest rotation is taken, and only
+        a matrix without one is refused.
 
     Examples
     --------
     >>> from_matrix([[-1, 0, 0], [0, 1, 0], [0, 0, -1]]).tolist()  # half a turn about y
     [0.0, 0.0, 1.0, 0.0]
     """
-    R = as_array("R", R, 3, 3)
+    return of_rotation(rotation_of("R", R, project))
+
+
+def of_rotation(R: Array) -> Array:
+    """:func:`from_matrix` of what is known to be rotations ``R (..., 3, 3)``: nothing is checked.
+
+    The ten sums below are 4 q q^T.  Each row of it is q times one of q's own entries; the row of
+    the largest entry, which is at least 1/2, loses no digits at any angle.
+    """
     d = np.diagonal(R, axis1=-2, axis2=-1)
     K = np.empty((*R.shape[:-2], 4, 4))
     K[..., 0, 0] = 1.0 + d.sum(-1)

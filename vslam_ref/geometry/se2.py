@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array, blocks, times
 from vslam_ref.geometry import so2
-from vslam_ref.geometry.coefficients import rotation_coefficients
+from vslam_ref.geometry.coefficients import require_no_pole, rotation_coefficients
 from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 
 DOF = 3
@@ -177,11 +177,14 @@ def _bend(xi: Array) -> Array:
 
 
 def left_jacobian_inverse(xi: ArrayLike) -> Array:
-    """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); defined for |phi| < 2 pi.
+    """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); it has poles at 2 pi, 4 pi, ...
 
-    The tangent vector is xi = (rho, phi) in metres and radians; shape of the result (..., 3, 3).
+    The tangent vector is xi = (rho, phi) in metres and radians; shape of the result (..., 3, 3).  ValueError
+    next to a pole: V there is 2 sin(phi / 2) / phi times a rotation.
     """
     xi = as_array("xi", xi, 3)
+    half = rotation_coefficients(xi[..., 2] ** 2 / 4)[1]  # sin(phi/2) / (phi/2)
+    require_no_pole(half * half, np.ones(()), xi[..., 2] ** 2)
     V_inv = _v_inverse(xi[..., 2])
     return blocks([[V_inv, -V_inv @ _bend(xi)], [0.0, np.ones((1, 1))]])
 

@@ -19,6 +19,7 @@ from vslam_ref.arrays import Array, as_array, blocks, times, transpose
 from vslam_ref.geometry import so3
 from vslam_ref.geometry.coefficients import rotation_coefficients, rotation_polynomial
 from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
+from vslam_ref.geometry.orthonormal import rotation_of
 
 DOF = 6
 
@@ -102,16 +103,29 @@ def exp(xi: ArrayLike) -> Array:
     return from_rt(R, times(V, rho))  # so3.exp and so3.left_jacobian share what costs them time
 
 
-def log(T: ArrayLike) -> Array:
+def log(T: ArrayLike, *, project: bool = False) -> Array:
     """Tangent vector with Exp(xi) = T and an angle in [0, pi], shape (..., 4, 4) -> (..., 6).
 
-    Returns xi = (rho, phi) in metres and radians.
+    Returns xi = (rho, phi) in metres and radians.  ValueError if the 3 x 3 block is no rotation up to
+    rounding; with ``project`` the nearest rotation is taken.
 
     Implements :eq:`eq-log-rigid`.
     """
     T = as_array("T", T, 4, 4)
-    phi = so3.log(T[..., :3, :3])
-    return np.concatenate([times(so3.left_jacobian_inverse(phi), T[..., :3, 3]), phi], -1)
+    return _log(rotation_of("R of T", T[..., :3, :3], project), T[..., :3, 3])
+
+
+def log_of_motion(T: Array) -> Array:
+    """:func:`log` of what is known to be rigid motions ``T (..., 4, 4)``: nothing is checked.
+
+    Returns xi = (rho, phi) in metres and radians.
+    """
+    return _log(T[..., :3, :3], T[..., :3, 3])
+
+
+def _log(R: Array, t: Array) -> Array:
+    phi = so3.log_of_rotation(R)
+    return np.concatenate([times(so3.left_jacobian_inverse(phi), t), phi], -1)
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
@@ -203,9 +217,10 @@ def q_matrix(xi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(xi: ArrayLike) -> Array:
-    """Inverse of :func:`left_jacobian`: [[V^-1, -V^-1 Q V^-1], [0, V^-1]]; for angles below 2 pi.
+    """Inverse of :func:`left_jacobian`: [[V^-1, -V^-1 Q V^-1], [0, V^-1]]; poles at 2 pi, 4 pi, ...
 
     The tangent vector is xi = (rho, phi) in metres and radians; shape of the result (..., 6, 6).
+    ValueError next to a pole, as :func:`.so3.left_jacobian_inverse`.
     """
     xi = as_array("xi", xi, 6)
     V_inv = so3.left_jacobian_inverse(xi[..., 3:])

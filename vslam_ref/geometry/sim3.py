@@ -26,6 +26,7 @@ from vslam_ref.geometry.coefficients import (
 )
 from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 from vslam_ref.geometry.nearest import nearest_rotation
+from vslam_ref.geometry.orthonormal import require_rotation
 
 # of 4 x 4 matrices: the same functions as for rigid motions
 from vslam_ref.geometry.se3 import act as act
@@ -137,12 +138,20 @@ def exp(xi: ArrayLike) -> Array:
     return from_srt(np.exp(sigma), so3.exp(phi), times(w_matrix(phi, sigma), rho))
 
 
-def log(S: ArrayLike) -> Array:
+def log(S: ArrayLike, *, project: bool = False) -> Array:
     """Tangent vector with Exp(xi) = S and an angle in [0, pi], shape (..., 4, 4) -> (..., 7).
 
-    Returns xi = (rho, phi, sigma): metres, radians, log-scale.
+    Returns xi = (rho, phi, sigma): metres, radians, log-scale.  ValueError if the 3 x 3 block over its scale
+    is no rotation up to rounding; with ``project`` the nearest similarity is taken.
     """
-    phi, sigma = so3.log(rotation(S)), np.log(scale(S))
+    if project:
+        S = nearest(S)
+    s = scale(S)
+    if not np.all((s > 0.0) & np.isfinite(s)):
+        raise ValueError("S is no similarity: its scale is zero or not finite")
+    R = rotation(S)
+    require_rotation("R of S", R)
+    phi, sigma = so3.log_of_rotation(R), np.log(s)
     rho = times(w_matrix_inverse(phi, sigma), translation(S))
     return np.concatenate([rho, phi, sigma[..., None]], -1)
 

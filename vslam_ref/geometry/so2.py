@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, as_array, times, transpose
+from vslam_ref.geometry.orthonormal import require_rotation
 
 DOF = 1
 
@@ -53,12 +54,17 @@ def exp(phi: ArrayLike) -> Array:
     return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
 
 
-def log(R: ArrayLike) -> Array:
+def log(R: ArrayLike, *, project: bool = False) -> Array:
     """Angle in (-pi, pi] of a rotation matrix, shape (..., 2, 2) -> (...).
 
-    Returns ``phi (...)`` in radians.
+    Returns ``phi (...)`` in radians.  ValueError if a matrix is no rotation up to rounding; with ``project``
+    the nearest rotation is taken, and only a matrix without one is refused.
     """
     R = as_array("R", R, 2, 2)
+    if project:
+        R = nearest(R)
+    else:
+        require_rotation("R", R)
     angle: Array = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
     return angle
 

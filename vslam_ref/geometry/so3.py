@@ -5,8 +5,9 @@ the angle in radians.  Perturbations act from the left, ``R <- Exp(phi) R``.  ``
 b to coordinates in a.  Matrices have no unit; arrays of other shapes raise ValueError.
 
 Accuracy: every function is within 1e-14 of the exact value (relative, in the Frobenius norm) for angles up to
-:math:`2\pi`.  The inverse of the left Jacobian has a pole at :math:`2\pi`, and
-loses there what its condition takes.
+:math:`2\pi`.  The inverse of the left Jacobian has poles at
+:math:`2\pi` and its multiples, loses near them what its condition takes, and is refused where fewer than four
+digits are left.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from vslam_ref.geometry.coefficients import (
 )
 from vslam_ref.geometry.jacobians import Acted, Combined, Unary, combined
 from vslam_ref.geometry.nearest import nearest_rotation
+from vslam_ref.geometry.orthonormal import rotation_of
 
 DOF = 3
 
@@ -85,17 +87,26 @@ def exp(phi: ArrayLike) -> Array:
     return rotation_polynomial(np.ones_like(c[1]), c[1], c[2], hat(phi))
 
 
-def log(R: ArrayLike) -> Array:
+def log(R: ArrayLike, *, project: bool = False) -> Array:
     """Rotation vector with Exp(phi) = R and an angle in [0, pi], shape (..., 3, 3) -> (..., 3).
 
-    Returns ``phi (..., 3)`` in radians.
+    Returns ``phi (..., 3)`` in radians.  ValueError if a matrix is no rotation up to rounding (see
+    :mod:`.orthonormal`); with ``project`` the nearest rotation is taken.
 
     Implements :eq:`eq-log-rotation`.  It goes through the quaternion, which is well conditioned at every
     angle: arccos((tr R - 1) / 2) would lose half of all digits near 0 and near pi, and the antisymmetric
     part its direction near pi.  At pi itself both ends of the axis are right; see
     :func:`.quaternion.canonical`.
     """
-    return quaternion.log(quaternion.from_matrix(R))
+    return log_of_rotation(rotation_of("R", R, project))
+
+
+def log_of_rotation(R: Array) -> Array:
+    """:func:`log` of what is known to be rotations ``R (..., 3, 3)``: nothing is checked.
+
+    Returns ``phi (..., 3)`` in radians.
+    """
+    return quaternion.log(quaternion.of_rotation(R))
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Array:
@@ -160,9 +171,10 @@ def left_jacobian(phi: ArrayLike) -> Array:
 
 
 def left_jacobian_inverse(phi: ArrayLike) -> Array:
-    """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); it exists for angles below 2 pi.
+    """Inverse of :func:`left_jacobian`, shape (..., 3) -> (..., 3, 3); it has poles at 2 pi, 4 pi, ...
 
-    ``phi (..., 3)`` in radians; shape of the result (..., 3, 3).
+    ``phi (..., 3)`` in radians; shape of the result (..., 3, 3).  ValueError so near to a pole that
+    fewer than four digits are left (see :func:`.inverse_coefficients`).
 
     Implements :eq:`eq-v-inverse`.
     """

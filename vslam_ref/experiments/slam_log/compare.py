@@ -21,6 +21,7 @@ from vslam_ref.systems.slam_log import (
     RobotCalibration,
     RunSettings,
     SlamLog,
+    gap_notes,
     run_log,
     summary,
 )
@@ -169,10 +170,17 @@ def document(comparison: Comparison, asked: str) -> dict[str, Any]:
         "batch": bound,
         "sightings": int(sum(len(s.ids) for s in source.log.sightings)),
         "dropped": dict(source.log.dropped),
+        "notes": list(notes(source)),
         "truth": _truth_note(source.truth),
         "blind": None if source.truth is None else errors_while_blind(comparison.runs[asked], source.truth),
         "config": config_to_dict(comparison.config),
     }
+
+
+def notes(source: Source) -> tuple[str, ...]:
+    """What is odd in the files of a log, and where it is silent."""
+    of_truth = () if source.truth is None else source.truth.notes
+    return (*source.log.notes, *of_truth, *gap_notes(source.log))
 
 
 def _truth_note(truth: LogTruth | None) -> str | None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, IntArray, transpose
-from vslam_ref.filters.block_covariance import diagonal_blocks
+from vslam_ref.filters.block_covariance import diagonal_blocks, innovation_root
 from vslam_ref.filters.carleman_ekf import lift, moments
 from vslam_ref.filters.estimates import (
     Innovation,
@@ -165,8 +165,9 @@ class LiftedCarlemanEkf(SlamFilter):
     def _update_known(self, slots: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
         """Kalman update of all lifted states. Implements :eq:`eq-gain`."""
         seen, HP = self._expected(slots, z, cov_z)
-        root = np.linalg.cholesky(seen.S)
-        G, y = np.linalg.solve(root, HP), np.linalg.solve(root, seen.innovation[:, :, None])
+        root = innovation_root(seen.S)
+        G = np.asarray(np.linalg.solve(root, HP), dtype=np.float64)
+        y = np.linalg.solve(root, seen.innovation[:, :, None])
         G[np.sum(y[:, :, 0] ** 2, 1) > gate] = 0.0
         self._z[:, : self.size] += (transpose(G) @ y)[:, :, 0]  # eq-gain
         self._P[:, : self.size, : self.size] -= transpose(G) @ G

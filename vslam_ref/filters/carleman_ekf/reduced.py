@@ -153,9 +153,11 @@ class ReducedCarlemanEkf(SlamFilter):
         return Innovation(seen.innovation, seen.S)
 
     def _update_known(self, columns: IntArray, z: Array, cov_z: Array, gate: float) -> Innovation:
-        b, self._noisy = self.blocks, False
+        b = self.blocks
         noise = b.b, self._P_a, self._frame
-        return Innovation(*reduced_update_in_place(b.state, *noise, columns, z, cov_z, gate))
+        seen = Innovation(*reduced_update_in_place(b.state, *noise, columns, z, cov_z, gate))
+        self._noisy = False  # not before: a singular S leaves the noise where it is
+        return seen
 
     def _augment(self, ids: IntArray, z: Array, cov_z: Array) -> None:
         """r_new = z, uncorrelated with everything; its world place p + h z, when carried, is not."""

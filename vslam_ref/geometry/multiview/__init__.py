@@ -11,6 +11,9 @@ module                   holds
 ``two_view_optimum``     the global optimum for two views, from a polynomial of degree six
 ``three_points``         every camera that sees three points where they were seen (P3P)
 ``resection``            a camera from six points and more, or four of a plane, by linear equations
+``triples``              a camera from the best of many triples of points
+``point_shape``          how wide, thin and stretched a set of points is; which points are far
+``linear_pose``          the answer of these methods, and why there may be none
 =======================  ==========================================================================
 
 Point sets are aligned by :mod:`vslam_ref.geometry.alignment`.  What minimises a cost in pixels is one floor
@@ -27,10 +30,10 @@ from vslam_ref.geometry.multiview.epipolar import (
     relative_motion,
     sampson_distance,
 )
+from vslam_ref.geometry.multiview.linear_pose import LinearPose, PoseState
+from vslam_ref.geometry.multiview.point_shape import nearness
 from vslam_ref.geometry.multiview.point_state import PointState
 from vslam_ref.geometry.multiview.resection import (
-    LinearPose,
-    PoseState,
     dlt,
     planar_dlt,
     resect_linear,
@@ -38,6 +41,7 @@ from vslam_ref.geometry.multiview.resection import (
 )
 from vslam_ref.geometry.multiview.three_points import ThreePointPoses, p3p
 from vslam_ref.geometry.multiview.triangulation import LinearPoints, triangulate_linear
+from vslam_ref.geometry.multiview.triples import best_of_three
 from vslam_ref.geometry.multiview.two_view_optimum import CorrectedPair, correct_pair
 from vslam_ref.geometry.multiview.views import Views
 
@@ -51,6 +55,7 @@ __all__ = [
     "ThreePointPoses",
     "Views",
     "align",
+    "best_of_three",
     "book",
     "correct_pair",
     "dlt",
@@ -59,6 +64,7 @@ __all__ = [
     "fundamental_from_essential",
     "midpoint",
     "midpoint_with_jacobians",
+    "nearness",
     "p3p",
     "planar_dlt",
     "relative_motion",

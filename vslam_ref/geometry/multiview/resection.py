@@ -14,14 +14,16 @@ to its left part fixes sign and size.
 
 With the rotation known, the translation is the solution of the linear system :math:`N_b t = -N_b R X`.
 
-These are not optimal: they measure distances from rays, in the world's unit, and not pixels.
+**Far points.**  These equations measure distances from rays, in the world's unit, and not pixels.  An error
+of the rotation moves X off its ray by that angle times its distance: one point a thousand times as far as
+the others has a thousand times their say, and the translation serves it alone.  So what is more than ``FAR``
+times as far as usual counts by its direction only: its equations are divided by its distance, and the shape
+of the set is judged with such points drawn near.  Without far points nothing is weighted.
+
+What comes out is a start, and not optimal.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from enum import Enum
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +31,9 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, as_array
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview._rays import across
-from vslam_ref.geometry.multiview.three_points import p3p
+from vslam_ref.geometry.multiview.linear_pose import LinearPose, PoseState, checked_rays, no_pose
+from vslam_ref.geometry.multiview.point_shape import nearness, point_shape
+from vslam_ref.geometry.multiview.triples import best_of_three
 from vslam_ref.geometry.nearest import nearest_rotation
 
 FLAT = 1e-3
@@ -44,52 +48,6 @@ Without noise it is a power of the thickness; rounding of the rows gives some 1e
 """
 
 
-class PoseState(Enum):
-    """What became of a linear resection; the value is the sentence."""
-
-    OK = ""
-    TOO_FEW = "too few points"
-    ONE_PLACE = "the points lie at one place"
-    COLLINEAR = "the points lie on one line: a turn about it changes nothing"
-    COPLANAR = "the points lie in one plane: use the planar method"
-    NOT_COPLANAR = "the points do not lie in one plane"
-    AMBIGUOUS = "the equations have more than one solution"
-    BEHIND = "in the best pose a point lies behind the camera"
-    NO_ROTATION = "the linear solution is far from any rotation"
-
-
-@dataclass(frozen=True)
-class LinearPose:
-    """Pose by linear equations.
-
-    Attributes
-    ----------
-    T_cam_world : ndarray, shape (4, 4)
-        The identity where ``state`` is neither ``OK`` nor ``BEHIND``.
-    state : PoseState
-    method : str
-        ``dlt``, ``planar`` or ``p3p``.
-    spread : float
-        Ratio of the two smallest singular values, 0 to 1: how close the equations were to a second answer;
-        0 for ``p3p``.
-    """
-
-    T_cam_world: Array
-    state: PoseState
-    method: str
-    spread: float
-
-    @property
-    def ok(self) -> bool:
-        """Whether the pose may be used."""
-        return self.state is PoseState.OK
-
-    @property
-    def reason(self) -> str:
-        """Empty, or what is wrong."""
-        return self.state.value
-
-
 def resect_linear(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     """Pose by the method that number and shape of the points ask for.
 
@@ -102,18 +60,24 @@ def resect_linear(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     -------
     LinearPose
         By :func:`planar_dlt` if the points are flatter than one in a thousand, by :func:`dlt` if there are
-        six and more; four or five are answered with the best pose of three of them.
+        six and more; four or five are answered with :func:`best_of_three`, and so is where these two find
+        no pose.
 
     Raises
     ------
     ValueError
         If shapes do not fit, a number is not finite, or a bearing has not length 1.
     """
-    b, X = _checked(bearings, X_world)
-    _, extent, _, _ = _shape(X)
-    if extent[2] <= FLAT * extent[0]:
-        return planar_dlt(b, X)
-    return _best_of_three(b, X) if 4 <= len(X) <= 5 else dlt(b, X)
+    b, X = checked_rays(bearings, X_world)
+    _, extent, _, _ = point_shape(X)
+    flat = bool(extent[2] <= FLAT * extent[0])
+    if not flat and 4 <= len(X) <= 5:
+        return best_of_three(b, X)
+    found = planar_dlt(b, X) if flat else dlt(b, X)
+    if found.state not in (PoseState.BEHIND, PoseState.NO_ROTATION, PoseState.AMBIGUOUS):
+        return found
+    other = best_of_three(b, X)
+    return other if other.ok else found
 
 
 def dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
@@ -130,17 +94,17 @@ def dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     >>> dlt(X / np.linalg.norm(X, axis=1, keepdims=True), X).T_cam_world.round(9) + 0.0
     array([[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.], [0., 0., 0., 1.]])
     """
-    b, X = _checked(bearings, X_world)
-    middle, extent, _, size = _shape(X)
+    b, X = checked_rays(bearings, X_world)
+    middle, extent, _, size = point_shape(X)
     if len(X) < 6:
-        return _failed(PoseState.TOO_FEW, "dlt")
+        return no_pose(PoseState.TOO_FEW, "dlt")
     if (state := _narrow(extent)) is not PoseState.OK:
-        return _failed(state, "dlt")
+        return no_pose(state, "dlt")
     if extent[2] <= 1e-7 * extent[0]:  # a power of it, and rounding, must differ
-        return _failed(PoseState.COPLANAR, "dlt")
+        return no_pose(PoseState.COPLANAR, "dlt")
     x = np.concatenate([(X - middle) / size, np.ones((len(X), 1))], 1)
-    P, spread, unique = _smallest(b, x)
-    return _pose(b, X, P[:, :3], "dlt", spread) if unique else _failed(PoseState.AMBIGUOUS, "dlt", spread)
+    P, spread, unique = _smallest(b, x * nearness(X)[:, None])
+    return _pose(b, X, P[:, :3], "dlt", spread) if unique else no_pose(PoseState.AMBIGUOUS, "dlt", spread)
 
 
 def planar_dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
@@ -157,18 +121,18 @@ def planar_dlt(bearings: ArrayLike, X_world: ArrayLike) -> LinearPose:
     >>> planar_dlt(X / np.linalg.norm(X, axis=1, keepdims=True), X).T_cam_world.round(9) + 0.0
     array([[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.], [0., 0., 0., 1.]])
     """
-    b, X = _checked(bearings, X_world)
-    middle, extent, axes, size = _shape(X)
+    b, X = checked_rays(bearings, X_world)
+    middle, extent, axes, size = point_shape(X)
     if len(X) < 4:
-        return _failed(PoseState.TOO_FEW, "planar")
+        return no_pose(PoseState.TOO_FEW, "planar")
     if (state := _narrow(extent)) is not PoseState.OK:
-        return _failed(state, "planar")
+        return no_pose(state, "planar")
     if extent[2] > 0.1 * extent[0]:
-        return _failed(PoseState.NOT_COPLANAR, "planar")
+        return no_pose(PoseState.NOT_COPLANAR, "planar")
     x = np.concatenate([(X - middle) @ axes[:2].T / size, np.ones((len(X), 1))], 1)
-    H, spread, unique = _smallest(b, x)
+    H, spread, unique = _smallest(b, x * nearness(X)[:, None])
     if not unique:
-        return _failed(PoseState.AMBIGUOUS, "planar", spread)
+        return no_pose(PoseState.AMBIGUOUS, "planar", spread)
     # the third column as the others' cross product, at their length; the sign of both is the sign of H
     third = np.cross(H[:, 0], H[:, 1])
     third /= np.sqrt(max(float(np.linalg.norm(third)), 1e-300))
@@ -200,28 +164,13 @@ def tilted_twin(T_cam_world: ArrayLike, X_world: ArrayLike) -> Array:
     array([-0.3,  0. ,  0. ])
     """
     T, X = as_array("T_cam_world", T_cam_world, 4, 4), as_array("X_world", X_world, 3)
-    middle, _, axes, _ = _shape(X)
+    middle, _, axes, _ = point_shape(X)
     seat = se3.act(T, middle)
     v = seat / np.linalg.norm(seat)
     e = axes[:2] @ T[:3, :3].T  # the plane's axes in the camera, as rows
     e = e - 2.0 * (e @ v)[:, None] * v
     R = np.column_stack([e[0], e[1], np.cross(e[0], e[1])]) @ axes
     return se3.from_rt(R, seat - R @ middle)
-
-
-def _best_of_three(b: Array, X: Array) -> LinearPose:
-    """Of the poses of all triples the one in which all points lie best on their rays, and in front."""
-    triples = np.array(list(combinations(range(len(X)), 3)))
-    found = p3p(b[triples], X[triples])
-    poses = found.T_cam_world[found.valid]
-    X_cam = se3.act(poses[:, None], X)
-    front = (np.sum(X_cam * b, axis=-1) > 0).all(axis=1)
-    if not front.any():
-        return _failed(PoseState.BEHIND if len(poses) else PoseState.AMBIGUOUS, "p3p")
-    poses, X_cam = poses[front], X_cam[front]
-    sine = np.linalg.norm(np.cross(X_cam, b), axis=-1) / np.linalg.norm(X_cam, axis=-1)
-    order = np.argsort(np.sum(sine**2, axis=1))
-    return LinearPose(poses[order[0]], PoseState.OK, "p3p", 0.0)
 
 
 def _smallest(b: Array, x: Array) -> tuple[Array, float, bool]:
@@ -239,8 +188,8 @@ def _pose(b: Array, X: Array, M: Array, method: str, spread: float) -> LinearPos
     try:
         R = nearest_rotation(sign * M).R
     except ValueError:
-        return _failed(PoseState.NO_ROTATION, method, spread)
-    N = across(b)
+        return no_pose(PoseState.NO_ROTATION, method, spread)
+    N = across(b) * nearness(X)[:, None, None]
     t = np.linalg.lstsq(N.reshape(-1, 3), -np.einsum("nij,nj->ni", N, X @ R.T).ravel(), rcond=None)[0]
     T = se3.from_rt(R, t)
     behind = bool((np.sum(b * se3.act(T, X), axis=1) <= 0).any())
@@ -253,39 +202,7 @@ def _in_front(pose: LinearPose, b: Array, X: Array) -> int:
     return int(np.count_nonzero(np.sum(b * se3.act(pose.T_cam_world, X), axis=1) > 0))
 
 
-def _shape(X: Array) -> tuple[Array, Array, Array, float]:
-    """Middle, extents along three axes (falling), the axes (rows), and the root mean square distance."""
-    if len(X) == 0:
-        return np.zeros(3), np.zeros(3), np.eye(3), 1.0
-    middle = X.mean(axis=0)
-    _, s, axes = np.linalg.svd(X - middle, full_matrices=True)
-    axes[2] = np.cross(axes[0], axes[1])  # right-handed
-    extent = np.pad(s, (0, 3 - len(s))) / np.sqrt(len(X))
-    rounding = 8 * np.finfo(np.float64).eps * float(np.abs(X).max())
-    extent = np.where(extent > rounding, extent, 0.0)
-    size = float(np.sqrt(np.sum(extent**2)))
-    return middle, extent, axes, size if size > 0 else 1.0
-
-
 def _narrow(extent: Array) -> PoseState:
     if extent[0] == 0.0:
         return PoseState.ONE_PLACE
     return PoseState.COLLINEAR if extent[1] <= 1e-7 * extent[0] else PoseState.OK
-
-
-def _failed(state: PoseState, method: str, spread: float = 1.0) -> LinearPose:
-    return LinearPose(np.eye(4), state, method, spread)
-
-
-def _checked(bearings: ArrayLike, X_world: ArrayLike) -> tuple[Array, Array]:
-    b, X = as_array("bearings", bearings, 3), as_array("X_world", X_world, 3)
-    if b.ndim != 2 or b.shape != X.shape:
-        raise ValueError(f"bearings {b.shape} and X_world {X.shape}: need (N, 3) twice")
-    for name, values in (("bearing", b), ("point", X)):
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(bad):
-            raise ValueError(f"{name} {bad[0]} is {values[bad[0]].tolist()}: must be finite")
-    bad = np.flatnonzero(~(np.abs(np.linalg.norm(b, axis=1) - 1.0) < 1e-6))
-    if len(bad):
-        raise ValueError(f"bearing {bad[0]} is {b[bad[0]].tolist()}: must be a unit vector")
-    return b, X

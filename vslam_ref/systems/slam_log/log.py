@@ -52,6 +52,8 @@ class SlamLog(NamedTuple):
         In order of time.
     dropped : mapping of str to int
         Sightings the reader left out, counted by reason.
+    notes : tuple of str
+        What the reader found odd, a sentence each.
     """
 
     name: str
@@ -62,6 +64,7 @@ class SlamLog(NamedTuple):
     controls: Array
     sightings: tuple[LoggedSighting, ...]
     dropped: Mapping[str, int]
+    notes: tuple[str, ...] = ()
 
 
 class LogTruth(NamedTuple):
@@ -81,6 +84,8 @@ class LogTruth(NamedTuple):
         The point whose position is given, in the vehicle frame, metres: where the antenna stands.
     exact : bool
         Whether errors against it are the estimate's own (motion capture), or also the reference's (GPS).
+    notes : tuple of str
+        What the reader found odd, a sentence each.
     """
 
     times: Array
@@ -90,3 +95,4 @@ class LogTruth(NamedTuple):
     landmarks: Array
     lever: Array
     exact: bool
+    notes: tuple[str, ...] = ()

@@ -7,7 +7,8 @@
     steps      |---------|-|------|--|------------|---|-|
 
 Without a time limit for steps, every control begins a step of its own (odometry rate).  With
-``max_step``, neighbouring controls are summed up to that duration.
+``max_step``, neighbouring controls are summed up to that duration.  Through a gap of the odometry the last
+control holds, with the variance that :mod:`.gaps` adds, spread evenly over the gap.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.filters import vehicle
 from vslam_ref.systems.slam_log.calibration import RobotCalibration
+from vslam_ref.systems.slam_log.gaps import gap_variances
 from vslam_ref.systems.slam_log.log import SlamLog
 
 
@@ -110,7 +112,7 @@ def build_timeline(
     inc = control_increments(log, calibration)
     # zero-order hold: the sums up to any time are linear between the stamps
     start, where = np.unique(log.times, return_index=True)
-    each = np.hstack([inc, increment_variances(inc, calibration)])
+    each = np.hstack([inc, increment_variances(inc, calibration) + gap_variances(log.times, inc)])
     way = np.vstack([np.zeros(4), np.cumsum(each, 0)])[where]
     sums = np.stack([np.interp(cuts, start, way[:, i]) for i in range(4)], -1)
     steps = np.diff(sums, axis=0)

@@ -143,7 +143,7 @@ def apart(T: ArrayLike, S: ArrayLike) -> float:
     1.621
     """
     T, S = as_array("T", T, 4, 4), as_array("S", S, 4, 4)
-    turn = float(np.linalg.norm(so3.log(se3.rotation(T) @ se3.rotation(S).T)))
+    turn = float(np.linalg.norm(so3.log_of_rotation(se3.rotation(T) @ se3.rotation(S).T)))
     t, s = se3.translation(T), se3.translation(S)
     return max(turn, float(np.arctan2(np.linalg.norm(np.cross(t, s)), t @ s)))
 
