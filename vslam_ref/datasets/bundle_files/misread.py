@@ -2,14 +2,15 @@
 
 BAL and Bundler count v upwards from the image's centre, and their cameras look along -z.  Programs that see
 the world as computer vision does (v downwards, from a corner, cameras along +z) and write such a file without
-a conversion leave one that can be read, and even adjusted: views from afar fit a mirrored scene not badly.
-What gives it away is that another reading of the same numbers fits far better::
+a conversion leave one that can be read, and even adjusted: with v the other way round, the mirror image of
+the scene fits as well as the scene, only the start is far from it.  So the start gives it away::
 
-    the file as read     ->  median error at the start        of all readings that which starts best,
-    v downwards          ->  median error at the start        if it is not the file's own, is adjusted, too:
-    from a corner        ->  ...                              told if it ends at less than half the error
+    the file as read     ->  median error at the start        the reading that starts best, where that is
+    v downwards          ->  median error at the start        another one and at less than half the error,
+    from a corner        ->  ...                              is adjusted, too: told if it ends alike
 
-A right file starts best as it is read, so it costs a projection a reading, and nothing is told.
+Where the file as read did not converge, any better start is followed, and told only if it ends at less than
+half the error.  A right file starts best as it is read: that costs a projection a reading, and is silent.
 """
 
 from __future__ import annotations
@@ -29,17 +30,20 @@ from vslam_ref.estimation.bundle.result import BundleResult
 
 FORMATS = {"bal": "BAL", "bundler": "Bundler"}
 FAR_BETTER = 0.5
-"""Share of the error that the other reading must stay below, at the end."""
+"""Share of the error that the other reading stays below.  Starts moved by up to the size of the scene, of the
+public problems with 1,681 to 83,718 observations, never came below 0.84 when they were right."""
+ALIKE, ROUNDING = 2.0, 1e-9
+"""Ends are alike: up to this share of the other's error, or of the picture's spread where both are rounding."""
 CLEAR = 0.1
 """Share of the picture's spread below which a start fits: where no point of the file as read has an image."""
-LEAST = 8
-"""Observations: fewer fit anything."""
+LEAST = 40
+"""Observations: with 18, a wrong reading of a bad start reached 0.28."""
 
-V_DOWN = "v counts downwards; the format's v counts upwards: change the sign of every v"
-CORNER = "pixels are counted from a corner of the image; the format counts from its centre: subtract it"
+V_DOWN = "v counts downwards, the format's upwards (the scene comes out mirrored): change the sign of every v"
+CORNER = "pixels are counted from a corner of the image, the format's from its centre: subtract the centre"
 AHEAD = (
-    "cameras look along +z with y downwards; the format's look along -z with y upwards: "
-    "turn every R and t by diag(1, -1, -1)"
+    "cameras look along +z with y downwards, the format's along -z with y upwards: "
+    "multiply every R and t by diag(1, -1, -1)"
 )
 
 
@@ -91,7 +95,7 @@ FLIP4[:3, :3] = FLIP
 
 
 def _joined(*parts: str) -> str:
-    return "; and ".join(part for part in parts if part)
+    return "; ".join(part for part in parts if part)
 
 
 def likely_misread(
@@ -116,15 +120,28 @@ def likely_misread(
     if file.problem.sizes[2] < LEAST:
         return ""
     start = typical_error(*reprojection(file.problem))
-    best = min(other_readings(file), key=lambda one: typical_error(*reprojection(one.problem)), default=None)
-    needed = (FAR_BETTER if result.converged else 1.0) * start
-    if best is None or not typical_error(*reprojection(best.problem)) < needed:
+    best = min(other_readings(file), key=_start_of, default=None)
+    share = _start_of(best) / start if best is not None else 1.0
+    if best is None or not share < (FAR_BETTER if result.converged else 1.0):
         return ""
-    before = typical_error(result.residual, result.valid)
-    found = adjust(best.problem)
+    before, found = typical_error(result.residual, result.valid), adjust(best.problem)
     after = typical_error(found.residual, found.valid)
-    if not after < (FAR_BETTER * before if np.isfinite(before) else CLEAR * spread(file.problem)):
+    clear = np.isfinite(start) or _start_of(best) < CLEAR * spread(file.problem)
+    level = (
+        max(ALIKE * before, ROUNDING * spread(file.problem)) if share < FAR_BETTER else FAR_BETTER * before
+    )
+    if not clear or not after <= level:
         return ""
-    errors = f"{after:.3g} px instead of {before:.3g} px" if np.isfinite(before) else f"{after:.3g} px"
+    errors = (
+        f"{here:.3g} px at the {when}" + (f" (as it was read {there:.3g} px)" if np.isfinite(there) else "")
+        for when, here, there in (("start", _start_of(best), start), ("end", after, before))
+    )
     name = FORMATS[file.format]
-    return f"not {name}'s convention, it seems: {best.what}. So read, the median error is {errors}"
+    return (
+        f"the file seems to follow another convention than {name}'s: {best.what}. "
+        f"So read, the median error is {' and '.join(errors)}"
+    )
+
+
+def _start_of(reading: Reading) -> float:
+    return typical_error(*reprojection(reading.problem))
