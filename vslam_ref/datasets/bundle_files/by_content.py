@@ -148,7 +148,8 @@ def require_sayable(path: Path, file: BundleFile, *, binary: bool = False) -> tu
         elif kind == "colmap":
             require_colmap(path, file, binary=binary)
     except ValueError as error:
-        raise InputError(f"{path} cannot be written: {error}") from None
+        other = "; a COLMAP folder can (a name without a suffix)" if kind == "bal" else ""
+        raise InputError(f"{path} cannot be written: {error}{other}") from None
     blanks = sum(len(name.split()) > 1 for name in file.view_names)
     if kind == "colmap" and not binary and blanks:
         cut = "COLMAP's own reader of text cuts a name at its first blank"

@@ -33,7 +33,7 @@ FAR_BETTER = 0.5
 """Share of the error that the other reading stays below.  Starts moved by up to the size of the scene, of the
 public problems with 1,681 to 83,718 observations, never came below 0.84 when they were right."""
 ALIKE, ROUNDING = 2.0, 1e-9
-"""Ends are alike: up to this share of the other's error, or of the picture's spread where both are rounding."""
+"""Ends are alike: up to this share of the other's error, or of the spread where both are rounding."""
 CLEAR = 0.1
 """Share of the picture's spread below which a start fits: where no point of the file as read has an image."""
 LEAST = 40

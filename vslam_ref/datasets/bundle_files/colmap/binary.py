@@ -33,7 +33,7 @@ from vslam_ref.datasets.bundle_files.colmap.parts import (
     PointParts,
     require_small,
 )
-from vslam_ref.datasets.bundle_files.loading import FARTHEST, load
+from vslam_ref.datasets.bundle_files.loading import FARTHEST, counted, load
 from vslam_ref.datasets.text import FormatError
 
 FILES = ("cameras.bin", "images.bin", "points3D.bin")
@@ -98,7 +98,7 @@ class ByteReader:
         left = len(self.data) - self.at
         if left:
             raise FormatError(
-                self.path, None, f"{left} bytes go on behind {what}; expected the end of the file"
+                self.path, None, f"{counted(left, 'byte')} more behind {what}; expected the end of the file"
             )
 
     def _require(self, size: int, what: str) -> None:

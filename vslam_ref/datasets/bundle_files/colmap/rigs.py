@@ -80,29 +80,34 @@ def read_poses(parts: Parts) -> tuple[dict[int, Array], tuple[str, ...]]:
     """
     rigs_path, frames_path = (parts.path(name) for name in NAMES)
     there = [path.name for path in (rigs_path, frames_path) if path.exists()]
-    if len(there) < 2:
-        return {}, tuple(f"{name} without the other of the two is not used" for name in there)
-    rigs = dict(_rigs(rigs_path))
+    if not frames_path.exists():
+        return {}, tuple(f"{name} without {frames_path.name} is not used" for name in there)
+    rigs = dict(_rigs(rigs_path)) if rigs_path.exists() else None
     frames = list(_frames(frames_path, rigs))
     found: dict[int, Array] = {}
     for frame in frames:
-        rig = rigs[frame.rig]
         for sensor, image in frame.images:
-            T_sensor_rig = np.eye(4) if sensor == rig.reference else rig.poses.get(sensor)
+            T_sensor_rig = _in_rig(frame, sensor, rigs)
             if T_sensor_rig is not None:
                 found[image] = T_sensor_rig @ frame.T_rig_world
-    tied = max((1 + len(rig.poses) for rig in rigs.values()), default=1)
-    together = any(len(frame.images) > 1 for frame in frames)
-    return found, (_told(there, tied, together),)
+    tied = max((1 + len(rig.poses) for rig in (rigs or {}).values()), default=1)
+    most = max((len(frame.images) for frame in frames), default=1)
+    return found, (_told(there, max(tied, most)),)
 
 
-def _told(names: list[str], tied: int, together: bool) -> str:
+def _in_rig(frame: FramePart, sensor: Sensor, rigs: dict[int, RigPart] | None) -> Array | None:
+    """T_sensor_rig, or None where it is not known.  Without rigs, the only camera of a frame is its rig."""
+    if rigs is None:
+        return np.eye(4) if len(frame.images) == 1 else None
+    rig = rigs[frame.rig]
+    return np.eye(4) if sensor == rig.reference else rig.poses.get(sensor)
+
+
+def _told(names: list[str], tied: int) -> str:
     both = " and ".join(names)
-    if tied > 1 or together:
-        return (
-            f"{both} tie up to {tied} sensors together: here every image moves by itself, "
-            "and the two files are not written again"
-        )
+    if tied > 1:
+        each = "here every image moves by itself, and nothing of them is written again"
+        return f"{both} tie up to {tied} sensors together: {each}"
     return f"{both}: every image has a frame of its own; nothing of them is needed or written again"
 
 
@@ -133,10 +138,10 @@ def chosen_poses(parts: Parts, own: Array, by_frame: dict[int, Array]) -> tuple[
     told = []
     if moved:
         turn, shift = np.max(moved, axis=0)
-        by = f"up to {np.rad2deg(turn):.3g} degrees and {shift:.3g} in translation"
+        by = f"up to {round(float(np.rad2deg(turn)), 4):g} degrees and {round(float(shift), 6):g} in translation"
         told.append(
             f"{len(moved)} of {len(own)} poses in {images} differ from those of {frames}, by {by}: "
-            f"those of {frames} are used, as COLMAP does"
+            f"those of {frames} are taken, as COLMAP does"
         )
     if lost:
         told.append(f"{lost} images have no pose by {frames}: theirs are those of {images}")
@@ -158,11 +163,11 @@ def _rigs(path: Path) -> Iterator[tuple[int, RigPart]]:
         yield key, RigPart(reference, poses)
 
 
-def _frames(path: Path, rigs: dict[int, RigPart]) -> Iterator[FramePart]:
+def _frames(path: Path, rigs: dict[int, RigPart] | None) -> Iterator[FramePart]:
     for fields in _each(path, "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS and its data", 68):
         fields.whole("I", "FRAME_ID")
         rig = fields.whole("I", "RIG_ID")
-        if rig not in rigs:
+        if rigs is not None and rig not in rigs:
             raise fields.place.error(path, f"RIG_ID is {rig}; expected one of {NAMES[0]}{path.suffix}")
         T_rig_world = _motion(path, fields)
         data = []
