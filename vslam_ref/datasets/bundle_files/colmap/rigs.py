@@ -26,7 +26,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.datasets.bundle_files.colmap.binary import ByteReader
 from vslam_ref.datasets.bundle_files.colmap.parts import POSE, Parts, Place, require_small
 from vslam_ref.datasets.bundle_files.colmap.text import records, small_numbers, text_lines, whole
-from vslam_ref.datasets.bundle_files.loading import LARGEST, UNIT_TOLERANCE
+from vslam_ref.datasets.bundle_files.loading import LARGEST, UNIT_TOLERANCE, counted
 from vslam_ref.datasets.text import decoded, read_bytes
 from vslam_ref.geometry import quaternion, se3, so3
 
@@ -70,8 +70,10 @@ class _Fields(Protocol):
     def pose(self) -> list[float]: ...
 
 
-def read_poses(parts: Parts) -> tuple[dict[int, Array], tuple[str, ...]]:
-    """Poses of images by rigs and frames: IMAGE_ID -> T_cam_world (4, 4), and what is to be told.
+def read_poses(parts: Parts) -> tuple[dict[int, Array] | None, tuple[str, ...]]:
+    """Poses of images by rigs and frames, and what is to be told: IMAGE_ID -> T_cam_world (4, 4).
+
+    None without frames.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def read_poses(parts: Parts) -> tuple[dict[int, Array], tuple[str, ...]]:
     rigs_path, frames_path = (parts.path(name) for name in NAMES)
     there = [path.name for path in (rigs_path, frames_path) if path.exists()]
     if not frames_path.exists():
-        return {}, tuple(f"{name} without {frames_path.name} is not used" for name in there)
+        return None, tuple(f"{name} without {frames_path.name} is not used" for name in there)
     rigs = dict(_rigs(rigs_path)) if rigs_path.exists() else None
     frames = list(_frames(frames_path, rigs))
     found: dict[int, Array] = {}
@@ -107,11 +109,14 @@ def _told(names: list[str], tied: int) -> str:
     both = " and ".join(names)
     if tied > 1:
         each = "here every image moves by itself, and nothing of them is written again"
-        return f"{both} tie up to {tied} sensors together: {each}"
+        tie = "tie" if len(names) > 1 else "ties"
+        return f"{both} {tie} up to {tied} sensors together: {each}"
     return f"{both}: every image has a frame of its own; nothing of them is needed or written again"
 
 
-def chosen_poses(parts: Parts, own: Array, by_frame: dict[int, Array]) -> tuple[Array, tuple[str, ...]]:
+def chosen_poses(
+    parts: Parts, own: Array, by_frame: dict[int, Array] | None
+) -> tuple[Array, tuple[str, ...]]:
     """Poses (V, 4, 4): an image's own, or that of its frame where the two disagree; and what is told.
 
     Parameters
@@ -119,10 +124,10 @@ def chosen_poses(parts: Parts, own: Array, by_frame: dict[int, Array]) -> tuple[
     parts : Parts
     own : ndarray, shape (V, 4, 4)
         Of the images, as their file has them.
-    by_frame : dict of int to ndarray
+    by_frame : dict of int to ndarray, or None
         From :func:`read_poses`.
     """
-    if not by_frame:
+    if by_frame is None:
         return own, ()
     T, moved, lost = own.copy(), [], 0
     for k, key in enumerate(parts.images):
@@ -138,13 +143,14 @@ def chosen_poses(parts: Parts, own: Array, by_frame: dict[int, Array]) -> tuple[
     told = []
     if moved:
         turn, shift = np.max(moved, axis=0)
-        by = f"up to {round(float(np.rad2deg(turn)), 4):g} degrees and {round(float(shift), 6):g} in translation"
+        degrees, length = round(float(np.rad2deg(turn)), 4), round(float(shift), 6)
+        by = f"up to {degrees:g} degrees and {length:g} in translation"
         told.append(
             f"{len(moved)} of {len(own)} poses in {images} differ from those of {frames}, by {by}: "
             f"those of {frames} are taken, as COLMAP does"
         )
     if lost:
-        told.append(f"{lost} images have no pose by {frames}: theirs are those of {images}")
+        told.append(f"{frames} has no pose for {counted(lost, 'image')}: taken from {images}")
     return T, tuple(told)
 
 
