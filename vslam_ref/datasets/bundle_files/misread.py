@@ -47,7 +47,7 @@ AHEAD = (
 )
 
 
-class Reading(NamedTuple):
+class OtherReading(NamedTuple):
     """The same numbers understood in another way, and what that way is."""
 
     problem: BundleProblem
@@ -71,7 +71,7 @@ def spread(problem: BundleProblem) -> float:
     return float(np.median(np.hypot(*(uv - np.median(uv, axis=0)).T)))
 
 
-def other_readings(file: BundleFile) -> Iterator[Reading]:
+def other_readings(file: BundleFile) -> Iterator[OtherReading]:
     """Readings of a file whose format has cameras that look back; none of another format's."""
     if file.format not in FORMATS:
         return
@@ -82,12 +82,12 @@ def other_readings(file: BundleFile) -> Iterator[Reading]:
             seen = replace(file.problem.seen, uv=file.problem.seen.uv * sign)
             plain = replace(file.problem, scene=scene, seen=seen)
             if looks or counts:
-                yield Reading(plain, _joined(looks, counts))
+                yield OtherReading(plain, _joined(looks, counts))
             r, valid = reprojection(plain)
             shift = np.median(r[valid], axis=0) if valid.any() else np.zeros(2)
             if np.hypot(*shift) > FAR_BETTER * spread(file.problem):
                 moved = replace(plain, seen=replace(seen, uv=seen.uv + shift))
-                yield Reading(moved, _joined(looks, counts, CORNER))
+                yield OtherReading(moved, _joined(looks, counts, CORNER))
 
 
 FLIP4 = np.eye(4)
@@ -143,5 +143,5 @@ def likely_misread(
     )
 
 
-def _start_of(reading: Reading) -> float:
+def _start_of(reading: OtherReading) -> float:
     return typical_error(*reprojection(reading.problem))

@@ -25,7 +25,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry.cameras import Camera
 
 
-class Part(NamedTuple):
+class FamilyPart(NamedTuple):
     """Observations of one family: its model, its columns of the intrinsics, their numbers (m,)."""
 
     model: type[Camera]
@@ -79,13 +79,13 @@ class Families:
             mask[number, self.columns(family)] = True
         return mask
 
-    def parts(self, lens: IntArray) -> Iterator[Part]:
+    def parts(self, lens: IntArray) -> Iterator[FamilyPart]:
         """Observations, whose sets of intrinsics are ``lens (n,)``, by family; no empty part."""
         family = np.asarray(self.of_set, dtype=np.int64)[lens]
         for number, model in enumerate(self.models):
             rows = np.flatnonzero(family == number)
             if len(rows):
-                yield Part(model, self.columns(number), rows)
+                yield FamilyPart(model, self.columns(number), rows)
 
 
 CameraModel = type[Camera] | Families

@@ -18,7 +18,7 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.estimation.bundle.families import CameraModel, Families, Part
+from vslam_ref.estimation.bundle.families import CameraModel, Families, FamilyPart
 from vslam_ref.estimation.bundle.projection import (
     BundleState,
     Linearised,
@@ -88,7 +88,7 @@ class _Orders(NamedTuple):
     view_order: IntArray
     view_offsets: IntArray
 
-    def only(self, part: Part) -> _Orders:
+    def only(self, part: FamilyPart) -> _Orders:
         """The same for some of the observations, renumbered."""
         kept = np.zeros(len(self.view_order), dtype=np.int64)
         kept[part.rows] = 1

@@ -28,7 +28,7 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.estimation.bundle.families import CameraModel, Families, Part
+from vslam_ref.estimation.bundle.families import CameraModel, Families, FamilyPart
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry.cameras import Pinhole, Radtan, pose_jacobian
 from vslam_ref.geometry.cameras import projection as cameras
@@ -92,7 +92,7 @@ def polynomial_params(intrinsics: Array) -> Array:
     return padded
 
 
-def divided(part: Part, state: BundleState, links: Links) -> tuple[BundleState, Links]:
+def divided(part: FamilyPart, state: BundleState, links: Links) -> tuple[BundleState, Links]:
     """What one family of lenses sees: the state with its block of intrinsics, and its observations."""
     own = np.ascontiguousarray(state.intrinsics[:, part.columns])
     rows = part.rows

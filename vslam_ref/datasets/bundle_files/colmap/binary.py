@@ -27,9 +27,9 @@ from vslam_ref.datasets.bundle_files.colmap.parts import (
     NO_POINT,
     POSE,
     CameraPart,
+    FilePlace,
     ImagePart,
     Parts,
-    Place,
     PointParts,
     require_small,
 )
@@ -132,7 +132,7 @@ def read_binary_parts(folder: Path, max_bytes: int | None = None) -> Parts:
     return Parts(folder, ".bin", cameras, _images(readers[1], cameras), _points(readers[2]))
 
 
-def require_new(path: Path, place: Place, name: str, key: int, found: dict[int, Any]) -> None:
+def require_new(path: Path, place: FilePlace, name: str, key: int, found: dict[int, Any]) -> None:
     """Refuse a number that an earlier record has."""
     if key in found:
         raise place.error(path, f"{name} {key} again; expected another")
@@ -143,7 +143,7 @@ def _cameras(file: ByteReader) -> dict[int, CameraPart]:
     total = file.count(CAMERA.size, "cameras")
     for k in range(total):
         key, number, *size = file.take(CAMERA, f"camera {k + 1} of {total}")
-        place = Place(None, f"camera {k + 1} of {total} (CAMERA_ID {key})")
+        place = FilePlace(None, f"camera {k + 1} of {total} (CAMERA_ID {key})")
         require_new(file.path, place, "CAMERA_ID", key, found)
         if not 0 <= number < len(BY_NUMBER):
             right = f"expected 0 to {len(BY_NUMBER) - 1} ({BY_NUMBER[0]} to {BY_NUMBER[-1]})"
@@ -167,7 +167,7 @@ def _images(file: ByteReader, cameras: dict[int, CameraPart]) -> dict[int, Image
     total = file.count(IMAGE.size + 1 + COUNT.size, "images")
     for k in range(total):
         key, *pose, camera = file.take(IMAGE, f"image {k + 1} of {total}")
-        place = Place(None, f"image {k + 1} of {total} (IMAGE_ID {key})")
+        place = FilePlace(None, f"image {k + 1} of {total} (IMAGE_ID {key})")
         require_new(file.path, place, "IMAGE_ID", key, found)
         require_small(file.path, place, pose, POSE)
         if camera not in cameras:
@@ -184,7 +184,7 @@ def _images(file: ByteReader, cameras: dict[int, CameraPart]) -> dict[int, Image
     return found
 
 
-def _require_features(path: Path, place: Place, uv: Array, point: NDArray[Any]) -> None:
+def _require_features(path: Path, place: FilePlace, uv: Array, point: NDArray[Any]) -> None:
     bad = np.argwhere(~(np.abs(uv) < FARTHEST))
     if len(bad):
         k, axis = bad[0].tolist()
@@ -231,5 +231,5 @@ def _points(file: ByteReader) -> PointParts:
     )
 
 
-def _place_of_point(k: int, total: int, key: int) -> Place:
-    return Place(None, f"point {k + 1} of {total} (POINT3D_ID {key})")
+def _place_of_point(k: int, total: int, key: int) -> FilePlace:
+    return FilePlace(None, f"point {k + 1} of {total} (POINT3D_ID {key})")

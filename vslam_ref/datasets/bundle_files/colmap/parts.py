@@ -28,7 +28,7 @@ NO_POINT = -1
 """POINT3D_ID of a feature without a point: -1 in a text, the largest number of 64 bits in a binary file."""
 
 
-class Place(NamedTuple):
+class FilePlace(NamedTuple):
     """Where something stands: its line in a text, or what it is in a binary file."""
 
     line: int | None
@@ -44,7 +44,7 @@ class Place(NamedTuple):
 class CameraPart(NamedTuple):
     """A camera: its model's name in the file, width and height, and parameters in the file's order."""
 
-    place: Place
+    place: FilePlace
     model: str
     size: tuple[int, int]
     params: list[float]
@@ -53,7 +53,7 @@ class CameraPart(NamedTuple):
 class ImagePart(NamedTuple):
     """An image; of its features the places (F, 2) and the points' numbers (F,), -1 for none."""
 
-    place: Place
+    place: FilePlace
     pose: list[float]
     camera: int
     name: str
@@ -67,7 +67,7 @@ class PointParts(NamedTuple):
     Attributes
     ----------
     place : callable
-        ``k -> Place`` of point k.
+        ``k -> FilePlace`` of point k.
     ids : ndarray, shape (N,)
     X : ndarray, shape (N, 3)
     colours : ndarray of uint8, shape (N, 3)
@@ -77,7 +77,7 @@ class PointParts(NamedTuple):
         IMAGE_ID and the number of the feature.
     """
 
-    place: Callable[[int], Place]
+    place: Callable[[int], FilePlace]
     ids: IntArray
     X: Array
     colours: NDArray[np.uint8]
@@ -100,7 +100,7 @@ class Parts:
         return self.folder / f"{name}{self.suffix}"
 
 
-def require_small(path: Path, place: Place, values: Sequence[float], names: Sequence[str]) -> None:
+def require_small(path: Path, place: FilePlace, values: Sequence[float], names: Sequence[str]) -> None:
     """Refuse numbers that are not finite, or so large that they leave no digits for others."""
     for name, value in zip(names, values, strict=True):
         if not abs(value) < FARTHEST:

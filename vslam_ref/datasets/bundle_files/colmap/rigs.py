@@ -24,7 +24,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.datasets.bundle_files.colmap.binary import ByteReader
-from vslam_ref.datasets.bundle_files.colmap.parts import POSE, Parts, Place, require_small
+from vslam_ref.datasets.bundle_files.colmap.parts import POSE, FilePlace, Parts, require_small
 from vslam_ref.datasets.bundle_files.colmap.text import records, small_numbers, text_lines, whole
 from vslam_ref.datasets.bundle_files.loading import LARGEST, UNIT_TOLERANCE, counted
 from vslam_ref.datasets.text import decoded, read_bytes
@@ -37,7 +37,7 @@ SAME = 1e-6
 """Radians, and share of the distance: what printing in twelve digits leaves is a thousand times less."""
 
 
-class Sensor(NamedTuple):
+class RigSensor(NamedTuple):
     """A sensor: its kind and number."""
 
     kind: int
@@ -47,26 +47,26 @@ class Sensor(NamedTuple):
 class RigPart(NamedTuple):
     """Reference sensor, and for the others T_sensor_rig, or None where it is not known."""
 
-    reference: Sensor | None
-    poses: dict[Sensor, Array | None]
+    reference: RigSensor | None
+    poses: dict[RigSensor, Array | None]
 
 
 class FramePart(NamedTuple):
     """A moment of a rig: T_rig_world, and the images taken then by their sensors."""
 
-    place: Place
+    place: FilePlace
     rig: int
     T_rig_world: Array
-    images: list[tuple[Sensor, int]]
+    images: list[tuple[RigSensor, int]]
 
 
 class _Fields(Protocol):
     """One record, field after field."""
 
-    place: Place
+    place: FilePlace
 
     def whole(self, kind: str, name: str) -> int: ...
-    def sensor(self, name: str) -> Sensor: ...
+    def sensor(self, name: str) -> RigSensor: ...
     def pose(self) -> list[float]: ...
 
 
@@ -97,7 +97,7 @@ def read_poses(parts: Parts) -> tuple[dict[int, Array] | None, tuple[str, ...]]:
     return found, (_told(there, max(tied, most)),)
 
 
-def _in_rig(frame: FramePart, sensor: Sensor, rigs: dict[int, RigPart] | None) -> Array | None:
+def _in_rig(frame: FramePart, sensor: RigSensor, rigs: dict[int, RigPart] | None) -> Array | None:
     """T_sensor_rig, or None where it is not known.  Without rigs, the only camera of a frame is its rig."""
     if rigs is None:
         return np.eye(4) if len(frame.images) == 1 else None
@@ -161,7 +161,7 @@ def _rigs(path: Path) -> Iterator[tuple[int, RigPart]]:
     for fields in _each(path, "RIG_ID NUM_SENSORS and its sensors", 8):
         key, sensors = fields.whole("I", "RIG_ID"), fields.whole("I", "NUM_SENSORS")
         reference = fields.sensor("REF_SENSOR") if sensors else None
-        poses: dict[Sensor, Array | None] = {}
+        poses: dict[RigSensor, Array | None] = {}
         for _ in range(sensors - 1):
             sensor = fields.sensor("SENSOR")
             has_pose = fields.whole("B", "HAS_POSE")
@@ -197,14 +197,14 @@ def _each(path: Path, right: str, least: int) -> Iterator[_Fields]:
     data = read_bytes(path, LARGEST)
     if path.suffix == ".txt":
         for line, _, words in records(path, text_lines(decoded(path, data)), right, lambda n: n >= 2):
-            text = _WordFields(path, Place(line), words)
+            text = _WordFields(path, FilePlace(line), words)
             yield text
             text.finish(right)
     else:
         reader, name = ByteReader(path, data), path.stem
         total = reader.count(least, name)
         for k in range(total):
-            yield _ByteFields(reader, Place(None, f"{name[:-1]} {k + 1} of {total}"))
+            yield _ByteFields(reader, FilePlace(None, f"{name[:-1]} {k + 1} of {total}"))
         reader.finish(f"the last of {total} {name}")
 
 
@@ -213,19 +213,19 @@ class _WordFields:
     """A line of a text."""
 
     path: Path
-    place: Place
+    place: FilePlace
     words: list[str]
     at: int = 0
 
     def whole(self, kind: str, name: str) -> int:
         return whole(self.path, self.place.line or 0, self._take(name, 1)[0], name)
 
-    def sensor(self, name: str) -> Sensor:
+    def sensor(self, name: str) -> RigSensor:
         kind = self._take(f"{name}_TYPE", 1)[0]
         if kind not in SENSORS:
             what = f"{name}_TYPE is {kind[:40]!r}; expected one of {', '.join(SENSORS)}"
             raise self.place.error(self.path, what)
-        return Sensor(SENSORS[kind], self.whole("I", f"{name}_ID"))
+        return RigSensor(SENSORS[kind], self.whole("I", f"{name}_ID"))
 
     def pose(self) -> list[float]:
         words = self._take("a pose", len(POSE))
@@ -249,13 +249,13 @@ class _ByteFields:
     """A record of a binary file."""
 
     reader: ByteReader
-    place: Place
+    place: FilePlace
 
     def whole(self, kind: str, name: str) -> int:
         return int(self.reader.take(struct.Struct(f"<{kind}"), f"{name} of {self.place.called}")[0])
 
-    def sensor(self, name: str) -> Sensor:
-        return Sensor(*self.reader.take(struct.Struct("<iI"), f"{name} of {self.place.called}"))
+    def sensor(self, name: str) -> RigSensor:
+        return RigSensor(*self.reader.take(struct.Struct("<iI"), f"{name} of {self.place.called}"))
 
     def pose(self) -> list[float]:
         values = list(self.reader.take(struct.Struct("<7d"), f"the pose of {self.place.called}"))

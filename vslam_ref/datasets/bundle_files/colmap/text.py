@@ -18,9 +18,9 @@ from vslam_ref.datasets.bundle_files.colmap.parts import (
     NO_POINT,
     POSE,
     CameraPart,
+    FilePlace,
     ImagePart,
     Parts,
-    Place,
     PointParts,
 )
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, LARGEST, load
@@ -109,7 +109,7 @@ def _cameras(path: Path, max_bytes: int | None) -> dict[int, CameraPart]:
                 right = f"expected {len(names)} for {model}: {', '.join(names)}"
                 raise FormatError(path, line, f"{len(words) - 4} parameters; {right}")
             params = small_numbers(path, line, words[4:], names.__getitem__)
-        found[key] = CameraPart(Place(line), model, (size[0], size[1]), params)
+        found[key] = CameraPart(FilePlace(line), model, (size[0], size[1]), params)
     return found
 
 
@@ -124,7 +124,7 @@ def _images(path: Path, max_bytes: int | None, cameras: dict[int, CameraPart]) -
             raise FormatError(path, line, f"CAMERA_ID is {camera}; expected one of cameras.txt")
         below, features = next(lines, (line + 1, ""))  # an empty last line is often cut off
         uv, point = _features(path, below, features)
-        found[key] = ImagePart(Place(line), pose, camera, words[9], uv, point)
+        found[key] = ImagePart(FilePlace(line), pose, camera, words[9], uv, point)
     return found
 
 
@@ -179,7 +179,7 @@ def _points(path: Path, max_bytes: int | None) -> PointParts:
     lengths = [len(track) // 2 for track in tracks]
     track = np.array([number for track in tracks for number in track], dtype=np.int64).reshape(-1, 2)
     return PointParts(
-        lambda k: Place(at[k]),
+        lambda k: FilePlace(at[k]),
         np.array(ids, dtype=np.int64),
         table[:, :3],
         table[:, 3:].astype(np.uint8),
