@@ -182,8 +182,15 @@ def _unfinished(result: BundleResult) -> list[str]:
     """What is told of an adjustment that did not come to rest."""
     if result.converged:
         return []
-    more = "; --set max_iterations=N tries more" if result.reason == "max_iterations" else ""
-    return [f"not converged after {result.iterations} steps ({result.message}): not a minimum{more}"]
+    if result.reason != "max_iterations":
+        return [f"not converged after {result.iterations} steps: {result.message}"]
+    last = next((step.decrease for step in reversed(result.history) if step.accepted), 0.0)
+    still = (
+        f"the last one still lowered the cost by {last / result.cost:.1g} of itself"
+        if last
+        else "none helped"
+    )
+    return [f"not converged after {result.iterations} steps: {still}; --set max_iterations=N takes more"]
 
 
 def _robust(name: str, scale: str | None) -> Robust:
