@@ -117,6 +117,14 @@ def own_columns(model: CameraModel, sets: int) -> BoolArray:
     return model.own if isinstance(model, Families) else np.ones((sets, len(model.names())), dtype=np.bool_)
 
 
+def parts_of(model: CameraModel, lens: IntArray) -> Iterator[FamilyPart]:
+    """Observations, whose sets of intrinsics are ``lens (n,)``, by camera model."""
+    if isinstance(model, Families):
+        yield from model.parts(lens)
+    else:
+        yield FamilyPart(model, slice(0, len(model.names())), np.arange(len(lens)))
+
+
 def camera_of(model: CameraModel, intrinsics: Array, number: int) -> Camera:
     """Camera of a set of intrinsics (L, p).
 

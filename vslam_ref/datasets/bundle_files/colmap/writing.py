@@ -15,10 +15,10 @@ from vslam_ref.datasets.bundle_files.colmap.models import HALF, params_to_colmap
 from vslam_ref.datasets.bundle_files.colmap.rows import CameraRow, ImageRow, PointRow
 from vslam_ref.datasets.bundle_files.colmap.text_writing import printed, require_printable
 from vslam_ref.datasets.bundle_files.record import BundleFile
-from vslam_ref.estimation.bundle.families import model_of_set
+from vslam_ref.estimation.bundle.families import model_of_set, parts_of
 from vslam_ref.estimation.bundle.problem import BundleProblem
-from vslam_ref.estimation.bundle.projection import reprojection
 from vslam_ref.geometry import quaternion
+from vslam_ref.geometry.cameras import projection
 from vslam_ref.support.files import new_folder, write_together
 
 GREY = (128, 128, 128)
@@ -178,8 +178,18 @@ def _points(file: BundleFile) -> Iterator[PointRow]:
 
 def mean_errors(problem: BundleProblem) -> Array:
     """Mean distance of each point's projections from where it was seen, pixels, shape (N,); -1 if nowhere."""
-    r, valid = reprojection(problem)
+    seen, scene = problem.seen, problem.scene
+    lens, distance, valid = problem.lens_of_view[seen.view], np.zeros(len(seen)), np.zeros(len(seen))
+    for part in parts_of(problem.model, lens):
+        rows, own = part.rows, scene.intrinsics[:, part.columns]
+        at = projection.pixel_from_world(
+            own[lens[rows]],
+            scene.T_cam_world[seen.view[rows]],
+            scene.X_world[seen.point[rows]],
+            lens=part.model.lens,
+        )
+        distance[rows] = np.where(at.valid, np.hypot(*(at.uv - seen.uv[rows]).T), 0.0)
+        valid[rows] = at.valid
     points = problem.sizes[1]
-    total = np.bincount(problem.seen.point, np.hypot(*r.T), points)
-    count = np.bincount(problem.seen.point, valid, points)
+    total, count = np.bincount(seen.point, distance, points), np.bincount(seen.point, valid, points)
     return np.where(count > 0, total / np.maximum(count, 1), -1.0)
