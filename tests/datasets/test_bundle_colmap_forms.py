@@ -354,6 +354,60 @@ def test_colmap_takes_the_same_poses(tmp_path: Path) -> None:
             np.testing.assert_allclose(theirs.images[key].cam_from_world().matrix(), T, rtol=0, atol=20 * EPS)
 
 
+# --- tracks ---------------------------------------------------------------------------------------
+
+
+def many_points(track_of_first: str, *, odd: int = 1) -> dict[str, str]:
+    """Two images of 40 points; the first points have another track than the images say."""
+    features = " ".join(f"{10.0 * j} 20.0 {j + 1}" for j in range(40))
+    images = "".join(f"{i} 1 0 0 0 {i} 0 5 4 {i}.jpg\n{features}\n" for i in (1, 2))
+    rows = [f"{j + 1} 0 0 {j} 1 2 3 0 {track_of_first if j < odd else f'1 {j} 2 {j}'}" for j in range(40)]
+    return {
+        "cameras.txt": "4 PINHOLE 640 480 500 500 320 240\n",
+        "images.txt": images,
+        "points3D.txt": "\n".join(rows),
+    }
+
+
+@pytest.mark.parametrize(
+    ("track", "notes"),
+    [
+        ("1 0 2 0", ()),
+        ("1 0 2 0 2 0", ()),
+        ("1 0", ("1 point whose TRACK differs from images.txt: images.txt is believed",)),
+        ("1 0 2 7", ("1 point whose TRACK differs from images.txt: images.txt is believed",)),
+        ("1 0 3 0", ("1 point whose TRACK differs from images.txt: images.txt is believed",)),
+        ("1 0 2 99", ("1 point whose TRACK differs from images.txt: images.txt is believed",)),
+        ("", ("1 point without a TRACK: what sees them is taken from images.txt",)),
+    ],
+)
+def test_a_few_tracks_may_differ_from_the_images(tmp_path: Path, track: str, notes: tuple[str, ...]) -> None:
+    file = read_colmap(folder_with(tmp_path / "t", many_points(track)))
+    assert file.notes == notes
+    assert file.problem.sizes == (2, 40, 80)
+    assert file.problem.seen.uv[:3].tolist() == [[-0.5, 19.5], [9.5, 19.5], [19.5, 19.5]]
+
+
+def test_many_tracks_that_differ_are_of_another_model(tmp_path: Path) -> None:
+    assert len(read_colmap(folder_with(tmp_path / "two", many_points("1 0", odd=2))).notes) == 1
+    with pytest.raises(FormatError, match=r"points3D\.txt:1: TRACK of point 1 has 1 images, images\.txt 2"):
+        read_colmap(folder_with(tmp_path / "three", many_points("1 0", odd=3)))
+
+
+def test_a_few_features_may_name_points_that_are_gone(tmp_path: Path) -> None:
+    texts = many_points("1 0 2 0")
+    for gone in (1, 3):
+        points = "\n".join(texts["points3D.txt"].split("\n")[gone:])
+        folder = folder_with(tmp_path / str(gone), texts | {"points3D.txt": points})
+        if gone == 3:
+            with pytest.raises(FormatError, match=r"POINT3D_ID of feature 0 is 1; expected -1 or one of"):
+                read_colmap(folder)
+            continue
+        file = read_colmap(folder)
+        assert file.notes == ("2 features of a point that points3D.txt does not have left out",)
+        assert file.problem.sizes == (2, 39, 78)
+
+
 # --- poses alone -----------------------------------------------------------------------------------
 
 

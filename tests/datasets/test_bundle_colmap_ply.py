@@ -317,7 +317,7 @@ POSE = "1 0 0 0 0 0 1"
         (line_of("points3D", 2, "100 0 0 1e99 1 2 3 1"), "points3D.txt:2", "Z is 1e+99"),
         (line_of("points3D", 3, "100 0 0 0 1 2 3 1"), "points3D.txt:3", "POINT3D_ID 100 again; line 2"),
         (line_of("points3D", 2, "100 0 0 0 1 2 3 1 6 1"), "points3D.txt:2", "TRACK names image 6"),
-        (line_of("points3D", 2, "100 0 0 0 1 2 3 1 5 1"), "points3D.txt:2", "has 1 features, images.txt 3"),
+        (line_of("points3D", 2, "100 0 0 0 1 2 3 1 5 1"), "points3D.txt:2", "has 1 images, images.txt 3"),
         (line_of("points3D", 2, "100 0 0 0 1 2 3 1 5 99"), "points3D.txt:2", "which has point none"),
     ],
 )

@@ -18,13 +18,15 @@ same, coefficient by coefficient.  With cameras of several families, each has a 
 (:mod:`vslam_ref.estimation.bundle.families`).
 
 Told in ``notes``: features without a point (left out), a second sight of a point in an image (left out),
-cameras that no image has (left out, of whatever model), rigs and frames, poses of images that frames correct.
+cameras that no image has (left out, of whatever model), a few tracks that differ from the images, rigs and
+frames, poses of images that frames correct.
 
 ====================  ===========================================
 module                holds
 ====================  ===========================================
 ``parts``             what the files say
 ``text``, ``binary``  the two forms, read
+``tracks``            what the points say once more, compared
 ``rigs``              rigs and frames
 ``models``            COLMAP's camera models and ours
 ``lenses``            the cameras as sets of intrinsics

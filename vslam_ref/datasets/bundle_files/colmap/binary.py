@@ -113,7 +113,7 @@ class ByteReader:
         )
 
 
-def read_binary_parts(folder: Path, max_bytes: int | None = None) -> Parts:
+def binary_parts(folder: Path, max_bytes: int | None = None) -> Parts:
     """Read ``cameras.bin``, ``images.bin`` and ``points3D.bin``.
 
     Parameters

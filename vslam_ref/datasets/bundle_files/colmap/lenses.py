@@ -36,7 +36,7 @@ class Lenses(NamedTuple):
     keys: tuple[int, ...]
 
 
-def read_lenses(parts: Parts) -> Lenses:
+def lenses_of(parts: Parts) -> Lenses:
     """Intrinsics of the cameras that an image has; cameras of one family share a model that can say all.
 
     Raises

@@ -6,15 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array
 from vslam_ref.datasets.bundle_files.colmap.binary import FILES as BINARY_FILES
-from vslam_ref.datasets.bundle_files.colmap.binary import read_binary_parts
-from vslam_ref.datasets.bundle_files.colmap.lenses import Lenses, read_lenses
+from vslam_ref.datasets.bundle_files.colmap.binary import binary_parts
+from vslam_ref.datasets.bundle_files.colmap.lenses import Lenses, lenses_of
 from vslam_ref.datasets.bundle_files.colmap.models import HALF, MODELS
 from vslam_ref.datasets.bundle_files.colmap.parts import NO_POINT, Parts
-from vslam_ref.datasets.bundle_files.colmap.rigs import chosen_poses, read_poses
+from vslam_ref.datasets.bundle_files.colmap.rigs import chosen_poses, frame_poses
 from vslam_ref.datasets.bundle_files.colmap.text import FILES as TEXT_FILES
-from vslam_ref.datasets.bundle_files.colmap.text import read_text_parts
+from vslam_ref.datasets.bundle_files.colmap.text import text_parts
+from vslam_ref.datasets.bundle_files.colmap.tracks import MOST_ODD, places, told_of_tracks
 from vslam_ref.datasets.bundle_files.loading import UNIT_TOLERANCE, counted, first_of_each, told_again
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.text import FormatError
@@ -47,10 +48,10 @@ def read_colmap(folder: Path | str, *, max_bytes: int | None = None) -> BundleFi
     parts, notes = _parts(folder, max_bytes)
     if not parts.images:
         raise FormatError(parts.path("images"), None, "no image; expected at least one")
-    _require_tracks(parts)
-    lenses = read_lenses(parts)
+    tracks = told_of_tracks(parts)
+    lenses = lenses_of(parts)
     seen, told = _observations(parts)
-    by_frame, rig_notes = read_poses(parts)
+    by_frame, rig_notes = frame_poses(parts)
     T_cam_world, stale = chosen_poses(parts, _own_poses(parts), by_frame)
     images, points = list(parts.images.values()), parts.points
     problem = BundleProblem(
@@ -65,7 +66,7 @@ def read_colmap(folder: Path | str, *, max_bytes: int | None = None) -> BundleFi
         colours=points.colours,
         image_sizes=lenses.sizes,
         camera_models=lenses.names,
-        notes=(*notes, *told, *_unused(parts, lenses), *rig_notes, *stale),
+        notes=(*notes, *told, *tracks, *_unused(parts, lenses), *rig_notes, *stale),
     )
 
 
@@ -76,10 +77,10 @@ def _parts(folder: Path, max_bytes: int | None) -> tuple[Parts, tuple[str, ...]]
     )
     if all(has_binary):
         both = "the folder has the model twice: the binary files are read, as COLMAP does, not the text"
-        return read_binary_parts(folder, max_bytes), (both,) if all(has_text) else ()
+        return binary_parts(folder, max_bytes), (both,) if all(has_text) else ()
     if sum(has_binary) > sum(has_text):
-        return read_binary_parts(folder, max_bytes), ()
-    return read_text_parts(folder, max_bytes), ()
+        return binary_parts(folder, max_bytes), ()
+    return text_parts(folder, max_bytes), ()
 
 
 def _unused(parts: Parts, lenses: Lenses) -> tuple[str, ...]:
@@ -106,64 +107,15 @@ def _own_poses(parts: Parts) -> Array:
     return np.asarray(se3.from_rt(R, values[:, 4:]))
 
 
-def _places(known: IntArray, wanted: IntArray) -> tuple[IntArray, BoolArray]:
-    """Where each wanted number stands among known ones, and whether it does."""
-    if not len(known):
-        return np.zeros(len(wanted), dtype=np.int64), np.zeros(len(wanted), dtype=np.bool_)
-    order = np.argsort(known, kind="stable")
-    at = order[np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)]
-    return at, np.asarray(known[at] == wanted)
-
-
-def _require_tracks(parts: Parts) -> None:
-    """Every track must name features that name this point: the two files say the same twice."""
-    points, path = parts.points, parts.path("points3D")
-    images = list(parts.images.values())
-    image, known = _places(np.array(list(parts.images), dtype=np.int64), points.track[:, 0])
-    if not known.all():
-        k = int(np.argmin(known))
-        what = f"TRACK names image {points.track[k, 0]}; expected one of {parts.path('images').name}"
-        raise points.place(int(points.track_point[k])).error(path, what)
-    lengths = np.array([len(one.point) for one in images], dtype=np.int64)
-    named = np.concatenate([one.point for one in images])
-    feature = points.track[:, 1]
-    inside = feature < lengths[image]
-    start = np.concatenate([[0], np.cumsum(lengths)])[image]
-    there = np.full(len(feature), NO_POINT - 1)
-    there[inside] = named[(start + feature)[inside]]
-    wrong = np.flatnonzero(there != points.ids[points.track_point])
-    if len(wrong):
-        k = int(wrong[0])
-        point = there[k] if inside[k] else "none"
-        what = f"TRACK names feature {feature[k]} of image {points.track[k, 0]}, which has point {point}"
-        at = int(points.track_point[k])
-        raise points.place(at).error(path, f"{what}; expected {points.ids[at]}")
-    _require_lengths(parts, named)
-
-
-def _require_lengths(parts: Parts, named: IntArray) -> None:
-    """Every point's track must be as long as the number of features that name it."""
-    points = parts.points
-    at, known = _places(points.ids, named)
-    by_images = np.bincount(at[known], minlength=len(points.ids))
-    by_track = np.bincount(points.track_point, minlength=len(points.ids))
-    bad = np.flatnonzero(by_images != by_track)
-    if len(bad):
-        k = int(bad[0])
-        has = f"TRACK of point {points.ids[k]} has {by_track[k]} features"
-        what = f"{has}, {parts.path('images').name} {by_images[k]}; expected the same"
-        raise points.place(k).error(parts.path("points3D"), what)
-
-
 def _observations(parts: Parts) -> tuple[Observations, tuple[str, ...]]:
     """Features with a point, the first of each image and point, and what is told of the others."""
     images = list(parts.images.values())
     lengths = [len(image.point) for image in images]
     named = np.concatenate([image.point for image in images])
     view = np.repeat(np.arange(len(images)), lengths)
-    point, known = _places(parts.points.ids, named)
+    point, known = places(parts.points.ids, named)
     bad = np.flatnonzero(~known & (named != NO_POINT))
-    if len(bad):
+    if len(bad) > MOST_ODD * np.count_nonzero(named != NO_POINT):
         image = images[view[bad[0]]]
         k = int(bad[0] - np.sum(lengths[: view[bad[0]]], dtype=np.int64))
         right = f"expected {NO_POINT} or one of {parts.path('points3D').name}"
@@ -172,7 +124,13 @@ def _observations(parts: Parts) -> tuple[Observations, tuple[str, ...]]:
     uv = np.concatenate([image.uv for image in images])[known] - HALF
     view, point = view[known], point[known]
     first = first_of_each(view, point)
-    unmatched = int((~known).sum())
+    unmatched = int((named == NO_POINT).sum())
     told = (f"{counted(unmatched, 'feature')} without a point left out",) if unmatched else ()
     again = told_again(~first, "an image")
-    return Observations(view[first], point[first], uv[first]), (*told, *again)
+    points = parts.path("points3D").name
+    gone = (
+        (f"{counted(len(bad), 'feature')} of a point that {points} does not have left out",)
+        if len(bad)
+        else ()
+    )
+    return Observations(view[first], point[first], uv[first]), (*told, *gone, *again)

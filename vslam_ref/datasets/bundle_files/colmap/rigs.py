@@ -70,7 +70,7 @@ class _Fields(Protocol):
     def pose(self) -> list[float]: ...
 
 
-def read_poses(parts: Parts) -> tuple[dict[int, Array] | None, tuple[str, ...]]:
+def frame_poses(parts: Parts) -> tuple[dict[int, Array] | None, tuple[str, ...]]:
     """Poses of images by rigs and frames, and what is to be told: IMAGE_ID -> T_cam_world (4, 4).
 
     None without frames.
@@ -125,7 +125,7 @@ def chosen_poses(
     own : ndarray, shape (V, 4, 4)
         Of the images, as their file has them.
     by_frame : dict of int to ndarray, or None
-        From :func:`read_poses`.
+        From :func:`frame_poses`.
     """
     if by_frame is None:
         return own, ()

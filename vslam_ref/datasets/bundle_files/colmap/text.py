@@ -32,7 +32,7 @@ NO_POINT_WORDS = ("-1", "18446744073709551615")
 """How programs write that a feature has no point: the second is the binary form's number, printed."""
 
 
-def read_text_parts(folder: Path, max_bytes: int | None = None) -> Parts:
+def text_parts(folder: Path, max_bytes: int | None = None) -> Parts:
     """Read ``cameras.txt``, ``images.txt`` and ``points3D.txt``.
 
     Parameters
@@ -161,6 +161,9 @@ def _points(path: Path, max_bytes: int | None) -> PointParts:
     ids: list[int] = []
     rows: list[list[float]] = []
     tracks: list[list[int]] = []
+    if not path.exists():
+        alone = "(a model of poses alone, with nothing to adjust, has an empty one)"
+        raise FormatError(path, None, f"no such file; expected one line a point {alone}")
     # COLMAP's guide to known poses says to leave this file empty
     lines = text_lines(decoded(path, read_bytes(path, max_bytes or LARGEST)))
     right = f"POINT3D_ID {' '.join(POINT)} and pairs IMAGE_ID POINT2D_IDX"
