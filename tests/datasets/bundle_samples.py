@@ -202,3 +202,58 @@ def write_colmap_texts(folder: Any, texts: dict[str, str]) -> Any:
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder
+
+
+def colmap_binary(texts: dict[str, str] | None = None) -> dict[str, bytes]:
+    """The model in COLMAP's binary form, packed from its text by the form's definition."""
+    numbers = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE")
+    numbers += ("FULL_OPENCV", "FOV")
+    words = {}
+    for name, text in (texts or colmap_texts()).items():
+        words[name] = [line.split() for line in text.splitlines() if not line.startswith("#")]
+    cameras = [struct.pack("<Q", len(words["cameras.txt"]))]
+    for key, model, width, height, *params in words["cameras.txt"]:
+        cameras.append(struct.pack("<IiQQ", int(key), numbers.index(model), int(width), int(height)))
+        cameras.append(struct.pack(f"<{len(params)}d", *map(float, params)))
+    images = [struct.pack("<Q", len(words["images.txt"]) // 2)]
+    for head, features in zip(words["images.txt"][::2], words["images.txt"][1::2], strict=True):
+        images.append(struct.pack("<I7dI", int(head[0]), *map(float, head[1:8]), int(head[8])))
+        images.append(" ".join(head[9:]).encode() + b"\0" + struct.pack("<Q", len(features) // 3))
+        for u, v, point in zip(*(features[axis::3] for axis in range(3)), strict=True):
+            images.append(struct.pack("<ddQ", float(u), float(v), int(point) % 2**64))
+    points = [struct.pack("<Q", len(words["points3D.txt"]))]
+    for row in words["points3D.txt"]:
+        points.append(
+            struct.pack("<Q3d3Bd", int(row[0]), *map(float, row[1:4]), *map(int, row[4:7]), float(row[7]))
+        )
+        points.append(struct.pack(f"<Q{len(row) - 8}I", (len(row) - 8) // 2, *map(int, row[8:])))
+    parts = {"cameras.bin": cameras, "images.bin": images, "points3D.bin": points}
+    return {name: b"".join(records) for name, records in parts.items()}
+
+
+def colmap_rigs(T_second: np.ndarray, reference: int = 4, second: int = 9) -> dict[str, str]:
+    """Rigs and frames for the sample: images 5 and 2 in one frame of two cameras, image 8 in another.
+
+    ``T_second (4, 4)`` is the second camera's pose in the rig.  The frames have the poses of images 5 and 8.
+    """
+    quaternions = Rotation.from_rotvec(TURNS).as_quat()[:, [3, 0, 1, 2]]
+    pose = [" ".join(repr(float(v)) for v in [*quaternions[i], *SHIFTS[i]]) for i in range(3)]
+    q = Rotation.from_matrix(T_second[:3, :3]).as_quat()[[3, 0, 1, 2]]
+    in_rig = " ".join(repr(float(v)) for v in [*q, *T_second[:3, 3]])
+    rigs = f"# rigs\n6 2 CAMERA {reference} CAMERA {second} 1 {in_rig}\n"
+    frames = f"# frames\n1 6 {pose[0]} 2 CAMERA 4 5 CAMERA 9 2\n7 6 {pose[2]} 1 CAMERA 4 8\n"
+    return {"rigs.txt": rigs, "frames.txt": frames}
+
+
+def colmap_rigs_binary(texts: dict[str, str]) -> dict[str, bytes]:
+    """Rigs and frames in the binary form."""
+    (rig,), frames = (
+        [line.split() for line in texts[name].splitlines()[1:]] for name in ("rigs.txt", "frames.txt")
+    )
+    rigs = struct.pack("<QIIiIiIB", 1, int(rig[0]), 2, 0, int(rig[3]), 0, int(rig[5]), 1)
+    out = [struct.pack("<Q", len(frames))]
+    for row in frames:
+        out.append(struct.pack("<II7dI", int(row[0]), int(row[1]), *map(float, row[2:9]), int(row[9])))
+        for at in range(10, len(row), 3):
+            out.append(struct.pack("<iIQ", 0, int(row[at + 1]), int(row[at + 2])))
+    return {"rigs.bin": rigs + struct.pack("<7d", *map(float, rig[7:])), "frames.bin": b"".join(out)}

@@ -23,6 +23,7 @@ from sequence_samples import CALIB, LAYOUTS, SIZE
 
 from vslam_ref.datasets.bundle_files import BundleFile
 from vslam_ref.datasets.trajectories import TrajectoryFile
+from vslam_ref.estimation.bundle.families import sensors
 from vslam_ref.geometry.cameras import Camera
 
 
@@ -104,7 +105,7 @@ def bundle_wrong(file: BundleFile) -> str:
     R = scene.T_cam_world[:, :3, :3]
     if np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() > 1e-9 or not (np.linalg.det(R) > 0).all():
         return "a rotation is none"
-    if not (scene.intrinsics[:, :2] > 0).all():
+    if not (sensors(file.problem.model, scene.intrinsics)[:, :2] > 0).all():
         return "a focal length is not positive"
     largest = max(
         np.abs(a).max(initial=0.0) for a in (scene.T_cam_world, scene.X_world, file.problem.seen.uv)
@@ -377,6 +378,8 @@ _PARK_LOG = _Log(0.0, _TIME / 1e3, np.stack([np.ones(len(_TIME)), np.zeros(len(_
 _BAL = bundle_samples.bal_text()
 _BUNDLER = bundle_samples.bundler_text()
 _COLMAP = _encoded(bundle_samples.colmap_texts())
+_RIGS = bundle_samples.colmap_rigs(np.diag([1.0, -1.0, -1.0, 1.0]))
+_TWO_FAMILIES = b"4 PINHOLE 640 480 500 510 320 240\n9 OPENCV_FISHEYE 800 600 600 600 400 300 0.1 0 0 0\n"
 _LIBMV = bundle_samples.libmv_bytes()
 
 SAMPLES: dict[str, list[Sample]] = {
@@ -396,7 +399,17 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample({"problem.bin": _LIBMV}, binary=True, check=bundle_wrong),
         Sample({"problem.bin": bundle_samples.libmv_bytes(">", b"N")}, binary=True, check=bundle_wrong),
     ],
-    "bundle_files.colmap.reading:read_colmap": [Sample(_COLMAP, check=bundle_wrong)],
+    "bundle_files.colmap.reading:read_colmap": [
+        Sample(_COLMAP, check=bundle_wrong),
+        Sample(bundle_samples.colmap_binary(), binary=True, check=bundle_wrong),
+        Sample(_COLMAP | _encoded(_RIGS), check=bundle_wrong),
+        Sample(
+            bundle_samples.colmap_binary() | bundle_samples.colmap_rigs_binary(_RIGS),
+            binary=True,
+            check=bundle_wrong,
+        ),
+        Sample(_COLMAP | {"cameras.txt": _TWO_FAMILIES}, check=bundle_wrong),
+    ],
     "bundle_files.by_content:read_bundle": [
         Sample(_one("problem", _BAL), check=bundle_wrong),
         Sample({"problem": _LIBMV}, binary=True, check=bundle_wrong),

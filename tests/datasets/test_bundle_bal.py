@@ -216,7 +216,6 @@ def replaced(line: int, words: str) -> str:
         (replaced(4, "-1 2 1.0 2.0"), 4, "camera of an observation is -1"),
         (replaced(4, "0 5 1.0 2.0"), 4, "point of an observation is 5; expected a whole number from 0 to 4"),
         (replaced(4, "0 2.5 1.0 2.0"), 4, "point of an observation is 2.5"),
-        (replaced(4, "0 0 1.0 2.0"), 4, "camera 0 sees point 0 again; line 2 has it already"),
         (replaced(4, "0 2 nan 2.0"), 4, "'nan' is not a number"),
         (replaced(4, "0 2 inf 2.0"), 4, "'inf' is not a number"),
         (replaced(4, "0 2 1e999 2.0"), 4, "'1e999' is not a number; expected a finite number"),
@@ -256,9 +255,18 @@ def test_an_error_at_the_end_of_a_large_file_is_found_as_fast_as_the_file_is_rea
     with pytest.raises(FormatError, match=r":300001: the file ends after|:300002: the file ends after"):
         read_bal(path)
     path.write_text((text + "0 0 1\n").replace("\n0 149999 ", "\n0 149998 "))
-    with pytest.raises(FormatError, match=r":150001: camera 0 sees point 149998 again; line 150000"):
-        read_bal(path)
+    assert read_bal(path).notes == (AGAIN,)
     assert time.process_time() - begin < 10.0  # measured: 1 s
+
+
+AGAIN = "1 observation of a point that a camera sees twice left out: the first one is kept"
+
+
+def test_a_point_seen_twice_is_counted_and_the_first_kept(tmp_path: Path) -> None:
+    file = read_bal(written(tmp_path, replaced(4, "0 0 1.0 2.0")))
+    assert file.notes == (AGAIN,)
+    assert file.problem.sizes == (3, 5, len(samples.PAIRS) - 1)
+    assert [1.0, -2.0] not in file.problem.seen.uv.tolist()
 
 
 def test_lonely_points_and_idle_cameras_are_no_errors_of_the_reader(tmp_path: Path) -> None:

@@ -7,11 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from vslam_ref.estimation.bundle import BundleProblem, Freedom, Observations, Scene, freedom, schur
+from vslam_ref.estimation.bundle import (
+    BundleProblem,
+    Families,
+    Freedom,
+    Observations,
+    Scene,
+    freedom,
+    schur,
+)
 from vslam_ref.estimation.bundle.normal import normal_equations
 from vslam_ref.estimation.bundle.structure import Structure, structure
 from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Radtan
+from vslam_ref.geometry.cameras import Fisheye, Radtan
 
 Rng = np.random.Generator
 
@@ -90,6 +98,30 @@ def for_schur_shared_held(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     return _for_schur(rng, B, n, shared=True, held=True)
 
 
+def for_schur_of_families(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
+    """Shared lenses of two families: the first column of some is missing, and so is the last of others."""
+    views, points = 2 * (B + 1), 2 * n
+    model = Families((Radtan, Fisheye), (1, 0, 1))
+    lens = np.zeros((3, model.width))
+    for number, family in enumerate(model.of_set):
+        own = model.columns(family)
+        lens[number, own] = rng.normal(0, 0.02, own.stop - own.start)
+        lens[number, own.start : own.start + 2] += 1.0
+    T = se3.perturb(np.eye(4), 0.2 * rng.standard_normal((views, 6)) + [0, 0, 3.0, 0, 0, 0])
+    scene = Scene(T, rng.uniform(-1, 1, (points, 3)), lens)
+    view, point = (a.ravel() for a in np.meshgrid(np.arange(views), np.arange(points)))
+    keep = rng.random(len(view)) < 0.8
+    seen = Observations(view[keep], point[keep], rng.normal(0, 0.3, (int(keep.sum()), 2)))
+    free = freedom(model, scene, intrinsics=("p1", "f", "k1", "k4"))
+    given = BundleProblem(model, scene, seen, np.arange(views) % 3, free)
+    table = structure(given)
+    weights = rng.uniform(0.5, 1, len(table.order))
+    normal = normal_equations(model, table.state(given), table, weights, free.intrinsics)
+    M = schur.point_factor(normal.C, np.ones((points, 3)), table.free_point)
+    sizes = (table.links.view, table.columns, table.size, table.offsets)
+    return (normal.B, normal.g_view, normal.g_point, normal.W, M, *sizes)
+
+
 def for_point_steps(rng: Rng, B: int, n: int) -> tuple[Any, ...]:
     _, _, g_point, W, M, view, columns, _, offsets = for_schur(rng, B, n)
     return W, M, g_point, rng.normal(size=columns.shape), view, offsets
@@ -104,6 +136,7 @@ ROWS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
         for_schur_shared,
         for_schur_held,
         for_schur_shared_held,
+        for_schur_of_families,
     ],
     "bundle_schur:point_steps": [for_point_steps],
 }

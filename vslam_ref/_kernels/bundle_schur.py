@@ -44,6 +44,15 @@ def _add_part(parts, at, size, columns, span):
     return parts + 1
 
 
+@njit(cache=True)
+def _same_lens(columns, i, j, own):
+    """Whether two views have the same columns of the lens; one column alone may be none in both."""
+    same = True
+    for a in range(own, columns.shape[1]):
+        same = same and columns[i, a] == columns[j, a]
+    return same
+
+
 def _block_of(width):
     """Make S[row:, column:] -= V Z^T for blocks of a width that the compiler knows, and its lower triangle.
 
@@ -163,7 +172,7 @@ def schur_complement(B, g_view, g_point, W, M, view, columns, size, offsets):
             parts = _add_part(parts, columns[view[o], :own], size, at, span)
         lens_part = parts - 1
         for o in range(begin, end):
-            if shared and (o == begin or columns[view[o], own] != columns[view[o - 1], own]):
+            if shared and (o == begin or not _same_lens(columns, view[o], view[o - 1], own)):
                 lens_part += 1
                 V[lens_part] = 0.0
                 parts = _add_part(parts, columns[view[o], own:], size, at, span)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vslam_ref.commands.options import (
     add_json,
@@ -24,7 +26,15 @@ if TYPE_CHECKING:
 HELP = "adjust a bundle: cameras and points from their images"
 EPILOG = """\
 formats (seen from the content): BAL text, plain or with .gz or .bz2; libmv .bin; Bundler bundle.out; a folder
-with COLMAP's cameras.txt, images.txt, points3D.txt
+with COLMAP's cameras, images and points3D, all .bin or all .txt (with both, the binary ones, as COLMAP does).
+Its cameras may be of several lens families; its poses are those of rigs and frames where these files are
+there, but every image moves by itself.
+
+What is odd in a file and harmless is told in lines 'note: ...', and in the list 'notes' of --json.
+
+--out FOLDER (new, empty, or with such a model) is written in COLMAP's text form; with --binary in its binary
+form, from which COLMAP also reads image names with blanks. All outputs are checked before the work; --json is
+written first, and whatever becomes of the others.
 
 losses: l2 (least squares, the default), huber, cauchy, geman-mcclure, tukey. A robust loss needs the size of
 an honest error: pixels, or 'adaptive', from the median of the errors after every step, as in PTAM.
@@ -70,7 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE", help="write the result: BAL (.txt, .gz, .bz2) or a COLMAP folder"
     )
-    parser.add_argument("--ply", metavar="FILE", help="write points and cameras for a viewer")
+    parser.add_argument("--binary", action="store_true", help="--out a COLMAP folder in its binary form")
+    parser.add_argument("--ply", metavar="FILE", help="write points and cameras for a viewer (.ply)")
     add_set(parser, "cost, gradient, scale, max_iterations, damping, method")
     add_json(parser)
 
@@ -78,40 +89,108 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, adjust, print the numbers and write what was asked for."""
     from vslam_ref import _kernels
-    from vslam_ref.datasets.bundle_files import read_bundle, write_bundle, write_ply
+    from vslam_ref.datasets.bundle_files import read_bundle
+    from vslam_ref.datasets.bundle_files.misread import likely_misread
     from vslam_ref.estimation.bundle import Options, bundle_adjust
     from vslam_ref.estimation.bundle.diagnosis import diagnose
     from vslam_ref.support.config import apply_overrides
 
-    target, ply, out = json_target(options), file_target(options.ply), file_target(options.out)
+    outputs = _Outputs.checked(options)
     settings = apply_overrides(Options(), options.set)
     robust = _robust(options.loss, options.scale)
     file = read_bundle(Path(options.file))
-    problem = _problem(file, options)
-    views, points, seen = problem.sizes
+    file = replace(file, problem=_problem(file, options))
+    told = outputs.sayable(file)
+    views, points, seen = file.problem.sizes
     print(f"{options.file}: {views} cameras, {points} points, {seen} observations")
-    notes = print_notes([*file.notes, *diagnose(problem).sentences()])
+    if not (points and seen):
+        raise ValueError(_nothing(options.file, views, points))
+    notes = print_notes([*file.notes, *diagnose(file.problem).sentences(), *told])
     with _kernels.use_backend(options.backend) as backend:
         warm("bundle", "bundle_schur")  # compiling is no part of the time
         wall, cpu = time.perf_counter(), time.process_time()
-        result = bundle_adjust(problem, robust, settings, _Table())
-        seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
+        result = bundle_adjust(file.problem, robust, settings, _Table())
+        spent = {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
+        why = likely_misread(file, result, lambda other: bundle_adjust(other, robust, settings))
     if result.reason in HOPELESS:
-        raise ValueError(f"{options.file} {HOPELESS[result.reason]}: nothing was adjusted, nothing written")
-    numbers = _numbers(result) | {
-        "seconds": seconds,
-        "cpu_seconds": cpu_seconds,
-        "backend": backend,
-        "notes": notes,
-    }
+        end = "nothing was adjusted, nothing written"
+        raise ValueError(f"{options.file} {HOPELESS[result.reason]}: {end}{why and '; '}{why}")
+    numbers = _numbers(result) | spent | {"backend": backend}
     _show(numbers, result)
-    write_json(target, {**numbers, "notes": notes})
-    after = file.at(result.problem.scene)
-    if ply is not None:
-        write_ply(ply, after)
-    if out is not None:
-        write_bundle(out, after)
+    notes += print_notes([*_unfinished(result), *([why] if why else [])])
+    outputs.write({**numbers, "notes": notes}, file.at(result.problem.scene))
     return 0
+
+
+class _Outputs(NamedTuple):
+    """Checked paths of what is written in the end."""
+
+    json: Path | None
+    ply: Path | None
+    out: Path | None
+    binary: bool
+
+    @classmethod
+    def checked(cls, options: argparse.Namespace) -> _Outputs:
+        """Check names and folders, before anything is read."""
+        from vslam_ref.datasets.bundle_files import require_target
+
+        if options.binary and options.out is None:
+            raise ValueError("--binary: a form of --out's COLMAP folder; give --out FOLDER")
+        out = None if options.out is None else require_target(options.out, binary=options.binary)
+        found = cls(json_target(options), file_target(options.ply, (".ply",)), out, options.binary)
+        paths = [path.resolve() for path in found[:3] if path is not None]
+        if len(set(paths)) < len(paths):
+            raise ValueError("two outputs have one name: --json, --ply and --out must differ")
+        return found
+
+    def sayable(self, file: BundleFile) -> tuple[str, ...]:
+        """Refuse what the format of ``--out`` cannot say, before any work; what is told of it."""
+        from vslam_ref.datasets.bundle_files import require_sayable
+
+        return () if self.out is None else require_sayable(self.out, file, binary=self.binary)
+
+    def write(self, numbers: dict[str, Any], after: BundleFile) -> None:
+        """Write all: the numbers first, and one that fails keeps none of the others from being written."""
+        from vslam_ref.datasets.bundle_files import write_bundle, write_ply
+
+        work: tuple[tuple[Path | None, Callable[[Path], None]], ...] = (
+            (self.json, lambda path: write_json(path, numbers)),
+            (self.out, lambda path: write_bundle(path, after, binary=self.binary)),
+            (self.ply, lambda path: write_ply(path, after)),
+        )
+        failed: list[Exception] = []
+        for path, write in work:
+            try:
+                if path is not None:
+                    write(path)
+            except (OSError, ValueError) as error:
+                failed.append(error)
+        if failed:
+            raise failed[0]
+
+
+def _nothing(name: str, views: int, points: int) -> str:
+    """Why a file without points or observations is not adjusted."""
+    if points:
+        return f"{name} has {points} points and no observations of them: nothing to adjust"
+    hint = "poses alone, as of a model with known poses; triangulate points first (colmap point_triangulator)"
+    return f"{name} has {views} cameras and no points: nothing to adjust ({hint})"
+
+
+def _unfinished(result: BundleResult) -> list[str]:
+    """What is told of an adjustment that did not come to rest."""
+    if result.converged:
+        return []
+    if result.reason != "max_iterations":
+        return [f"not converged after {result.iterations} steps: {result.message}"]
+    last = next((step.decrease for step in reversed(result.history) if step.accepted), 0.0)
+    still = (
+        f"the last one still lowered the cost by {last / result.cost:.1g} of itself"
+        if last
+        else "none helped"
+    )
+    return [f"not converged after {result.iterations} steps: {still}; --set max_iterations=N takes more"]
 
 
 def _robust(name: str, scale: str | None) -> Robust:
@@ -135,8 +214,6 @@ def _robust(name: str, scale: str | None) -> Robust:
 
 def _problem(file: BundleFile, options: argparse.Namespace) -> BundleProblem:
     """The file's problem with the freedom that was asked for."""
-    from dataclasses import replace
-
     from vslam_ref.estimation.bundle import freedom
     from vslam_ref.estimation.bundle.gauge import fix_gauge
 
@@ -176,6 +253,7 @@ def _numbers(result: BundleResult) -> dict[str, Any]:
         "final_cost": result.cost,
         "iterations": result.iterations,
         "reason": result.reason,
+        "converged": result.converged,
         "rmse_px": result.rmse_px,
         "sigma": result.sigma,
         "set_aside": int(result.aside.sum()),

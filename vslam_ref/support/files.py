@@ -14,7 +14,7 @@ import shutil
 import socket
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -111,6 +111,22 @@ def write_bytes(path: Path, data: bytes) -> None:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_together(folder: Path, content: Mapping[str, bytes]) -> None:
+    """Write several files into a folder that exists.
+
+    All are written under temporary names before the first takes its place.
+    """
+    temporary = {name: _temporary(folder / name, "tmp") for name in content}
+    try:
+        for name, data in content.items():
+            temporary[name].write_bytes(data)
+        for name, path in temporary.items():
+            os.replace(path, folder / name)
+    finally:
+        for path in temporary.values():
+            path.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -36,6 +36,7 @@ from vslam_ref.bench.rows import Part, Row, each_backend, measured, row
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.bundle_files import read_bal
 from vslam_ref.estimation.bundle import BundleProblem, Options, Scene, bundle_adjust
+from vslam_ref.estimation.bundle.families import model_of_set
 from vslam_ref.geometry.cameras import projection
 from vslam_ref.worlds.view_chain import chain
 
@@ -92,11 +93,12 @@ def cost(problem: BundleProblem, scene: Scene) -> float:
     A point behind its camera makes it infinite, whatever the solver made of it.
     """
     seen = problem.seen
+    model, _ = model_of_set(problem.model, 0)  # no problem of this bench mixes families
     at = projection.pixel_from_world(
         scene.intrinsics[problem.lens_of_view[seen.view]],
         scene.T_cam_world[seen.view],
         scene.X_world[seen.point],
-        lens=problem.model.lens,
+        lens=model.lens,
     )
     return 0.5 * float(np.sum((at.uv - seen.uv) ** 2)) if at.valid.all() else float("inf")
 

@@ -6,7 +6,7 @@ module        format                                          in, out  converts
 ``bal``       BAL text, plain, ``.gz``, ``.bz2``              in, out  cameras that look along -z
 ``bundler``   Bundler's ``bundle.out`` v0.3                   in       cameras that look along -z
 ``libmv``     libmv's binary dump                             in       numbers of images and tracks
-``colmap``    COLMAP's text model, a folder                   in, out  the pixels' origin
+``colmap``    COLMAP's model, binary or text, a folder        in, out  the pixels' origin
 ``ply``       PLY: points and cameras, to look at             out      nothing
 ============  ==============================================  =======  =================================
 
@@ -18,7 +18,13 @@ once, cameras without points and points behind cameras are no errors here: the a
 
 from vslam_ref.datasets.bundle_files.bal import read_bal, write_bal
 from vslam_ref.datasets.bundle_files.bundler import read_bundler
-from vslam_ref.datasets.bundle_files.by_content import detect, read_bundle, write_bundle
+from vslam_ref.datasets.bundle_files.by_content import (
+    detect,
+    read_bundle,
+    require_sayable,
+    require_target,
+    write_bundle,
+)
 from vslam_ref.datasets.bundle_files.colmap import read_colmap, write_colmap
 from vslam_ref.datasets.bundle_files.libmv import read_libmv
 from vslam_ref.datasets.bundle_files.ply import write_ply
@@ -32,6 +38,8 @@ __all__ = [
     "read_bundler",
     "read_colmap",
     "read_libmv",
+    "require_sayable",
+    "require_target",
     "write_bal",
     "write_bundle",
     "write_colmap",

@@ -20,11 +20,18 @@ from pathlib import Path
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.bundle_files.loading import FARTHEST, load, require_once, require_room
+from vslam_ref.datasets.bundle_files.loading import (
+    FARTHEST,
+    first_of_each,
+    load,
+    require_room,
+    told_again,
+)
 from vslam_ref.datasets.bundle_files.opengl_cameras import DOWN, FLIP, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.numbers import Numbers, read_numbers
 from vslam_ref.datasets.text import FormatError
+from vslam_ref.estimation.bundle.families import Families
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.geometry import so3
 from vslam_ref.geometry.cameras import Pinhole, Radtan
@@ -32,6 +39,8 @@ from vslam_ref.support.files import write_bytes
 
 COUNTS = ("cameras", "points", "observations")
 CAMERA = ("r1", "r2", "r3", "t1", "t2", "t3", "f", "k1", "k2")
+UNSAID = ("cx", "cy", "p1", "p2", "k3")
+"""Intrinsics that the format has no place for."""
 LARGEST_ANGLE = 1e6
 """Radians.  Of a longer rotation vector, sine and cosine would lose more than six digits."""
 
@@ -64,14 +73,14 @@ def read_bal(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
     at = 3 + 4 * np.arange(seen)
     view = numbers.whole(at, "camera of an observation", views)
     point = numbers.whole(at + 1, "point of an observation", points)
-    require_once(path, view, point, lambda k: numbers.line(3 + 4 * k))
+    first = first_of_each(view, point)
     numbers.require_below(FARTHEST)
     uv = np.stack([numbers.values[at + 2], numbers.values[at + 3]], -1)
     cameras = _cameras(numbers, 3 + 4 * seen, views)
     X_world = numbers.values[3 + 4 * seen + 9 * views :].reshape(points, 3)
     start = scene(so3.exp(cameras[:, :3]), cameras[:, 3:6], cameras[:, 6:], X_world)
-    problem = BundleProblem(Radtan, start, Observations(view, point, uv * DOWN), free=free(start))
-    return BundleFile(problem, "bal")
+    sights = Observations(view, point, uv * DOWN).only(first)
+    return BundleFile(BundleProblem(Radtan, start, sights, free=free(start)), "bal", notes=told_again(~first))
 
 
 def _counts(path: Path, data: bytes) -> tuple[int, int, int]:
@@ -138,17 +147,35 @@ def write_bal(path: Path | str, file: BundleFile) -> None:
     write_bytes(Path(path), ("\n".join(lines) + "\n").encode())
 
 
+def require_bal(problem: BundleProblem) -> None:
+    """Refuse what BAL cannot say, before any work: the lenses as they are, and what of them may move.
+
+    Raises
+    ------
+    ValueError
+        As :func:`write_bal`.
+    """
+    _lenses(problem)
+    names = problem.model.names() if not isinstance(problem.model, Families) else ()
+    moves = dict(zip(names, problem.free.intrinsics, strict=True))
+    for name in (name for name in UNSAID if name in moves and moves[name].any()):
+        raise ValueError(f"{name} may move: BAL cannot say it, it must stay 0")
+    if (moves["fx"] != moves["fy"]).any():
+        raise ValueError("fx and fy may move apart: BAL has one focal length, f")
+
+
 def _lenses(problem: BundleProblem) -> Array:
     """f, k1, k2 of each view, shape (V, 3)."""
-    names = problem.model.names()
-    if problem.model not in (Pinhole, Radtan):
-        raise ValueError(f"model {problem.model.__name__}: BAL has f, k1, k2 only (Radtan or Pinhole)")
+    model = problem.model
+    if isinstance(model, Families) or model not in (Pinhole, Radtan):
+        called = model.__name__ if not isinstance(model, Families) else "of several lens families"
+        raise ValueError(f"model {called}: BAL has f, k1, k2 only (Radtan or Pinhole)")
     if problem.seen.cov_uv is not None:
         raise ValueError("observations with covariances: BAL has no place for them")
     columns = problem.scene.intrinsics[problem.lens_of_view].T
-    params = dict(zip(names, columns, strict=True))
+    params = dict(zip(model.names(), columns, strict=True))
     params["fy - fx"] = params.pop("fy") - params["fx"]
-    for name in ("fy - fx", "cx", "cy", "p1", "p2", "k3"):
+    for name in ("fy - fx", *UNSAID):
         bad = np.flatnonzero(params.get(name, np.zeros(0)))
         if len(bad):
             raise ValueError(

@@ -25,10 +25,12 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.loading import (
     FARTHEST,
+    counted,
+    first_of_each,
     load,
-    require_once,
     require_room,
     rotations,
+    told_again,
 )
 from vslam_ref.datasets.bundle_files.opengl_cameras import DOWN, free, scene
 from vslam_ref.datasets.bundle_files.record import BundleFile
@@ -89,7 +91,7 @@ def read_bundler(
         path, rows[:, 3:12].reshape(-1, 3, 3), lambda k: numbers.line(int(table[kept[k], 3])), "camera"
     )
     begin = scene(R, rows[:, 12:], rows[:, :3], numbers.values[at[:, :3]])
-    seen, lost = _observations(numbers, counted_at, lengths, kept, cameras)
+    seen, lost, again = _observations(numbers, counted_at, lengths, kept, cameras)
     names = () if list_file is None else _names(Path(list_file), cameras)
     return BundleFile(
         BundleProblem(Radtan, begin, seen, free=free(begin)),
@@ -97,7 +99,7 @@ def read_bundler(
         view_names=tuple(names[k] for k in kept) if names else (),
         view_ids=kept,
         colours=colours,
-        notes=_notes(cameras, kept, lost),
+        notes=(*_notes(cameras, kept, lost), *again),
     )
 
 
@@ -140,20 +142,22 @@ def _lists(numbers: Numbers, start: int, points: int) -> tuple[IntArray, IntArra
 
 def _observations(
     numbers: Numbers, counted_at: IntArray, lengths: IntArray, kept: IntArray, cameras: int
-) -> tuple[Observations, int]:
-    """Sights of the cameras that are kept, and how many were of others."""
+) -> tuple[Observations, int, tuple[str, ...]]:
+    """Sights of the cameras that are kept, how many were of others, and what is told of repeated ones."""
     point = np.repeat(np.arange(len(lengths)), lengths)
     before = np.cumsum(lengths) - lengths
     at = counted_at[point] + 1 + PER_SIGHT * (np.arange(len(point)) - before[point])
     camera = numbers.whole(at, "camera of a sight", cameras)
     numbers.whole(at + 1, "key of a sight", 2**53, right="a whole number, 0 or more")
-    require_once(numbers.path, camera, point, lambda k: numbers.line(int(at[k])))
+    first = first_of_each(camera, point)
     place = np.full(cameras, -1, dtype=np.int64)
     place[kept] = np.arange(len(kept))
-    stays: NDArray[np.bool_] = place[camera] >= 0
+    placed: NDArray[np.bool_] = place[camera] >= 0
+    stays, placed_again = placed & first, placed & ~first
     at, camera, point = at[stays], camera[stays], point[stays]
     uv: Array = np.stack([numbers.values[at + 2], numbers.values[at + 3]], -1)
-    return Observations(place[camera], point, uv * DOWN), int((~stays).sum())
+    seen = Observations(place[camera], point, uv * DOWN)
+    return seen, int((~placed).sum()), told_again(placed_again)
 
 
 def _names(path: Path, cameras: int) -> list[str]:
@@ -170,4 +174,4 @@ def _notes(cameras: int, kept: IntArray, lost: int) -> tuple[str, ...]:
     if not len(gone):
         return ()
     shown = ", ".join(map(str, gone[:10].tolist())) + (", …" if len(gone) > 10 else "")
-    return (f"{len(gone)} cameras without a focal length were left out, with {lost} sights: {shown}",)
+    return (f"{counted(len(gone), 'camera')} without a focal length left out, with {lost} sights: {shown}",)

@@ -34,7 +34,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.datasets.bundle_files.loading import FARTHEST, load, require_once, require_room, rotations
+from vslam_ref.datasets.bundle_files.loading import (
+    FARTHEST,
+    first_of_each,
+    load,
+    require_room,
+    rotations,
+    told_again,
+)
 from vslam_ref.datasets.bundle_files.record import BundleFile
 from vslam_ref.datasets.text import FormatError
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations, Scene
@@ -81,7 +88,7 @@ def read_libmv(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
     if at != len(data):
         what = f"{len(data) - at} bytes after the last marker; expected the end of the file at byte {at}"
         raise FormatError(path, None, what)
-    seen, dropped = _observations(path, cameras["id"], points["id"], markers)
+    seen, dropped, again = _observations(path, cameras["id"], points["id"], markers)
     if dropped:
         notes.append(f"{dropped} markers of images or tracks that are not in the file were left out")
     R = rotations(path, np.swapaxes(cameras["R"], 1, 2).astype(np.float64), lambda _: None, "camera")
@@ -91,7 +98,7 @@ def read_libmv(path: Path | str, *, max_bytes: int | None = None) -> BundleFile:
         "libmv",
         view_ids=cameras["id"].astype(np.int64),
         point_ids=points["id"].astype(np.int64),
-        notes=tuple(notes),
+        notes=(*notes, *again),
     )
 
 
@@ -151,19 +158,14 @@ def _require_distinct(path: Path, ids: NDArray[Any], name: str) -> None:
 
 def _observations(
     path: Path, images: NDArray[Any], tracks: NDArray[Any], markers: NDArray[Any]
-) -> tuple[Observations, int]:
-    """Markers with views and points counted from 0, and how many belong to none."""
+) -> tuple[Observations, int, tuple[str, ...]]:
+    """Markers with views and points from 0, how many belong to none, and what is told of repeated ones."""
     view, point = _places(images, markers["view"]), _places(tracks, markers["point"])
     keep = np.flatnonzero((view >= 0) & (point >= 0))
     view, point = view[keep], point[keep]
-    require_once(
-        path,
-        view,
-        point,
-        lambda _: None,
-        lambda k: f"image {images[view[k]]} has track {tracks[point[k]]} (marker {keep[k]})",
-    )
-    return Observations(view, point, markers["uv"][keep]), len(markers) - len(keep)
+    first = first_of_each(view, point)
+    seen = Observations(view[first], point[first], markers["uv"][keep[first]])
+    return seen, len(markers) - len(keep), told_again(~first, "an image")
 
 
 def _places(ids: NDArray[Any], wanted: NDArray[Any]) -> IntArray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vslam_ref.arrays import Array, IntArray
+from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.datasets.text import FormatError, read_bytes
 from vslam_ref.geometry import so3
 
@@ -65,34 +65,42 @@ def require_room(path: Path, line: int | None, counts: str, needed: int, size: i
         raise FormatError(path, line, what)
 
 
-def repeated(view: IntArray, point: IntArray) -> tuple[int, int] | None:
-    """First two observations that pair the same view and point, or None."""
-    order = np.lexsort((np.arange(len(view)), point, view))
-    again = np.flatnonzero((np.diff(view[order]) == 0) & (np.diff(point[order]) == 0))
-    if not len(again):
-        return None
-    k = again[np.argmin(order[again + 1])]
-    return int(order[k]), int(order[k + 1])
+def first_of_each(view: IntArray, point: IntArray) -> BoolArray:
+    """Which observations are the first of their view and point, shape (n,).
 
-
-def require_once(
-    path: Path,
-    view: IntArray,
-    point: IntArray,
-    line: Callable[[int], int | None],
-    names: Callable[[int], str] | None = None,
-) -> None:
-    """Refuse a point that one view sees twice.
-
-    ``line(k)`` is the line of observation k, ``names(k)`` says who sees what (views are cameras by default).
+    Examples
+    --------
+    >>> first_of_each(np.array([0, 1, 0, 0]), np.array([5, 5, 5, 6])).tolist()
+    [True, True, False, True]
     """
-    twice = repeated(view, point)
-    if twice is not None:
-        first, second = twice
-        here, there = line(second), line(first)
-        place = f"observation {first}" if there is None else f"line {there}"
-        who = names(second) if names else f"camera {view[second]} sees point {point[second]}"
-        raise FormatError(path, here, f"{who} again; {place} has it already, expected it once")
+    order = np.lexsort((np.arange(len(view)), point, view))
+    first = np.ones(len(view), dtype=np.bool_)
+    first[order[1:]] = (np.diff(view[order]) != 0) | (np.diff(point[order]) != 0)
+    return first
+
+
+def told_again(again: BoolArray, who: str = "a camera") -> tuple[str, ...]:
+    """What is told where observations (n,) were left out since their view has the point already.
+
+    Examples
+    --------
+    >>> told_again(np.array([False, True]))
+    ('1 observation of a point that a camera sees twice left out: the first one is kept',)
+    """
+    count = int(again.sum())
+    what = f"of a point that {who} sees twice left out: the first one is kept"
+    return (f"{counted(count, 'observation')} {what}",) if count else ()
+
+
+def counted(count: int, noun: str) -> str:
+    """A number and its noun.
+
+    Examples
+    --------
+    >>> counted(1, "camera"), counted(2, "camera")
+    ('1 camera', '2 cameras')
+    """
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def rotations(path: Path, R: Array, line: Callable[[int], int | None], what: str) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.bundle_files.record import BundleFile
+from vslam_ref.estimation.bundle.families import sensors
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.geometry import se3
 from vslam_ref.support.files import write_bytes
@@ -107,7 +108,8 @@ def _cameras(file: BundleFile, depth: float, first: int) -> tuple[NDArray[np.voi
 def _corners(file: BundleFile) -> Array:
     """Corners of the image on the plane z = 1, going round, shape (L, 4, 3); distortion is left out."""
     problem = file.problem
-    focal, centre = problem.scene.intrinsics[:, None, :2], problem.scene.intrinsics[:, None, 2:4]
+    sensor = sensors(problem.model, problem.scene.intrinsics)
+    focal, centre = sensor[:, None, :2], sensor[:, None, 2:]
     if file.image_sizes is not None:
         low, high = np.full((len(focal), 2), -0.5), file.image_sizes - 0.5
     else:  # what was seen

@@ -7,6 +7,7 @@ see it, so the points are eliminated first (Schur complement), and a system of t
 module                holds
 ====================  ============================================================================
 ``problem``           scene, observations, covariances, what may move
+``families``          lenses of several families: a block of the intrinsics for each
 ``projection``        residuals and Jacobians of all observations
 ``structure``         orders and columns: which view meets which at a point
 ``normal``            the blocks of the normal equations
@@ -30,6 +31,7 @@ module                holds
 
 from vslam_ref.estimation.bundle import book, diagnosis, gauge, local, outliers
 from vslam_ref.estimation.bundle.covariance import covariance
+from vslam_ref.estimation.bundle.families import Families
 from vslam_ref.estimation.bundle.problem import BundleProblem, Freedom, Observations, Scene, freedom
 from vslam_ref.estimation.bundle.projection import reprojection
 from vslam_ref.estimation.bundle.result import BundleResult
@@ -40,6 +42,7 @@ from vslam_ref.estimation.least_squares import Iteration
 __all__ = [
     "BundleProblem",
     "BundleResult",
+    "Families",
     "Freedom",
     "Iteration",
     "Observations",

@@ -15,6 +15,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.bundle import projection, reduced_system, schur
+from vslam_ref.estimation.bundle.families import CameraModel, camera_of, own_columns
 from vslam_ref.estimation.bundle.normal import Normal, normal_equations
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.projection import BundleState
@@ -23,7 +24,6 @@ from vslam_ref.estimation.bundle.structure import Structure
 from vslam_ref.estimation.bundle.weights import Robust, Weighted, weigh
 from vslam_ref.estimation.least_squares import Step
 from vslam_ref.geometry import se3
-from vslam_ref.geometry.cameras import Camera
 
 DAMPED = (1e-6, 1e32)
 """Bounds of the squared column lengths that the damping multiplies."""
@@ -159,14 +159,15 @@ def moved(problem: BundleProblem, state: BundleState, step: Change) -> BundleSta
     T = se3.compose(se3.exp(step.view[:, :6]), se3.from_rt(state.R_cam_world, state.t_cam_world))
     intrinsics = state.intrinsics.copy()
     # views that share a lens have equal steps of it: any of them will do
-    intrinsics[problem.lens_of_view] += step.view[:, 6:] @ problem.free.intrinsics.T
+    own = own_columns(problem.model, len(intrinsics))[problem.lens_of_view]
+    intrinsics[problem.lens_of_view] += np.where(own, step.view[:, 6:] @ problem.free.intrinsics.T, 0.0)
     if step.view.shape[1] > 6 and not possible(problem.model, intrinsics):
         return None
     R, t = np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
     return BundleState(R, t, state.X_world + step.point, intrinsics)
 
 
-def possible(model: type[Camera], intrinsics: Array) -> bool:
+def possible(model: CameraModel, intrinsics: Array) -> bool:
     """Whether every set of intrinsics (L, p) makes a camera: focal lengths above 0, and so on.
 
     Examples
@@ -176,8 +177,8 @@ def possible(model: type[Camera], intrinsics: Array) -> bool:
     False
     """
     try:
-        for values in intrinsics:
-            model.from_params(values)
+        for number in range(len(intrinsics)):
+            camera_of(model, intrinsics, number)
     except ValueError:
         return False
     return True

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
+from vslam_ref.estimation.bundle.families import camera_of, model_of_set
 from vslam_ref.estimation.bundle.problem import BundleProblem, Scene
 from vslam_ref.estimation.robust import L2, Loss
 
@@ -99,7 +100,7 @@ def total_cost(problem: BundleProblem, scene: Scene, loss: Loss) -> float:
     for o in range(len(problem.seen)):
         i, j = int(problem.seen.view[o]), int(problem.seen.point[o])
         try:
-            camera = problem.model.from_params(scene.intrinsics[problem.lens_of_view[i]])
+            camera = camera_of(problem.model, scene.intrinsics, int(problem.lens_of_view[i]))
         except ValueError:  # no such camera: a focal length below zero
             return math.inf
         uv, valid = camera.pixel_from_world(scene.T_cam_world[i], scene.X_world[j])
@@ -117,14 +118,15 @@ def normal_blocks(problem: BundleProblem, scene: Scene, loss: Loss) -> _Blocks:
     for o in range(len(problem.seen)):
         i, j = int(problem.seen.view[o]), int(problem.seen.point[o])
         at = int(problem.lens_of_view[i])
-        camera = problem.model.from_params(scene.intrinsics[at])
+        camera = camera_of(problem.model, scene.intrinsics, at)
+        own = model_of_set(problem.model, at)[1]  # the block of its family
         seen = camera.pixel_from_world_with_jacobians(scene.T_cam_world[i], scene.X_world[j])
         error = seen.uv - problem.seen.uv[o]
         weight = float(loss.weight(_length(problem, o, error)))
         information = weight * _information(problem, o)  # eq-reweighted
         J = {  # eq-ba-jacobians
             ("view", i): seen.J_pose[:, problem.free.pose[i]],
-            ("lens", at): seen.J_intrinsics @ problem.free.intrinsics,
+            ("lens", at): seen.J_intrinsics @ problem.free.intrinsics[own],
             ("point", j): seen.J_point if problem.free.point[j] else seen.J_point[:, :0],
         }
         for a in J:
@@ -180,7 +182,8 @@ def moved(problem: BundleProblem, scene: Scene, steps: dict[Key, Array]) -> Scen
         if kind == "point":
             X[number] += step
         elif kind == "lens":
-            lenses[number] += problem.free.intrinsics @ step
+            own = model_of_set(problem.model, number)[1]
+            lenses[number, own] += problem.free.intrinsics[own] @ step
         else:
             xi = np.zeros(6)
             xi[problem.free.pose[number]] = step

@@ -18,10 +18,12 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
+from vslam_ref.estimation.bundle.families import CameraModel, Families, FamilyPart
 from vslam_ref.estimation.bundle.projection import (
     BundleState,
     Linearised,
     Links,
+    divided,
     is_polynomial,
     linearise,
     polynomial_params,
@@ -48,7 +50,7 @@ class Normal(NamedTuple):
 
 
 def normal_equations(
-    model: type[Camera], state: BundleState, table: Structure, weights: Array, basis: Array
+    model: CameraModel, state: BundleState, table: Structure, weights: Array, basis: Array
 ) -> Normal:
     """Linearise at a state and add up.
 
@@ -56,7 +58,7 @@ def normal_equations(
 
     Parameters
     ----------
-    model : type of Camera
+    model : type of Camera, or Families
     state : BundleState
     table : Structure
     weights : ndarray, shape (n,)
@@ -66,7 +68,46 @@ def normal_equations(
     """
     links, root = table.links, np.sqrt(weights)
     U = table.whitener * root[:, None, None]
-    orders = (table.offsets, table.view_order, table.view_offsets)
+    orders = _Orders(table.offsets, table.view_order, table.view_offsets)
+    if not isinstance(model, Families):
+        return _of_one_model(model, state, links, U, basis, orders)
+    whole = _zeros(len(table.view_offsets) - 1, len(table.offsets) - 1, len(links.uv), 6 + basis.shape[1])
+    for part in model.parts(links.lens):
+        own = (part.model, *divided(part, state, links), U[part.rows], basis[part.columns])
+        found = _of_one_model(*own, orders.only(part))
+        for name in ("B", "g_view", "C", "g_point"):
+            np.add(getattr(whole, name), getattr(found, name), out=getattr(whole, name))
+        whole.W[part.rows] = found.W
+    return whole
+
+
+class _Orders(NamedTuple):
+    """Where the observations of each point begin, and those of each view, as in ``Structure``."""
+
+    offsets: IntArray
+    view_order: IntArray
+    view_offsets: IntArray
+
+    def only(self, part: FamilyPart) -> _Orders:
+        """The same for some of the observations, renumbered."""
+        kept = np.zeros(len(self.view_order), dtype=np.int64)
+        kept[part.rows] = 1
+        before = np.concatenate([[0], np.cumsum(kept)])
+        by_view = kept[self.view_order]
+        before_in_views = np.concatenate([[0], np.cumsum(by_view)])
+        order = before[self.view_order[by_view > 0]]
+        return _Orders(before[self.offsets], order, before_in_views[self.view_offsets])
+
+
+def _zeros(views: int, points: int, n: int, d: int) -> Normal:
+    per_view, per_point = (np.zeros((views, d, d)), np.zeros((views, d))), (np.zeros((points, 3, 3)),)
+    return Normal(*per_view, *per_point, np.zeros((points, 3)), np.zeros((n, d, 3)))
+
+
+def _of_one_model(
+    model: type[Camera], state: BundleState, links: Links, U: Array, basis: Array, orders: _Orders
+) -> Normal:
+    """Linearise observations whose lenses are of one model, and add up."""
     if is_polynomial(model):
         padded = np.zeros((9, basis.shape[1]))
         padded[: len(basis)] = basis

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.geometry.cameras import Camera
+from vslam_ref.estimation.bundle.families import CameraModel, Families, directions, model_of_set, width
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class Scene:
     X_world : array_like, shape (N, 3)
         Points.
     intrinsics : array_like, shape (L, p)
-        Sets of intrinsics, each in the order of the camera model's ``names()``.
+        Sets of intrinsics, each in the order of the camera model's ``names()``; with lenses of several
+        families, each in the block of its own (:mod:`.families`).
     """
 
     T_cam_world: Array
@@ -122,8 +123,8 @@ class BundleProblem:
 
     Parameters
     ----------
-    model : type of Camera
-        The camera model of all views, for example ``Pinhole``.
+    model : type of Camera, or Families
+        The camera model of all views, for example ``Pinhole``, or that of each set of intrinsics.
     scene : Scene
         Where to start.
     seen : Observations
@@ -148,7 +149,7 @@ class BundleProblem:
     ValueError: observation 0 names point 7: there are 1 (numbers 0 to 0)
     """
 
-    model: type[Camera]
+    model: CameraModel
     scene: Scene
     seen: Observations
     lens_of_view: IntArray = None  # type: ignore[assignment]
@@ -157,14 +158,13 @@ class BundleProblem:
     def __post_init__(self) -> None:
         views, points, _ = self.sizes
         sets, parameters = self.scene.intrinsics.shape
-        if parameters != len(self.model.names()):
-            needs = ", ".join(self.model.names())
-            raise ValueError(f"intrinsics have {parameters} columns: {self.model.__name__} needs {needs}")
-        for number, values in enumerate(self.scene.intrinsics):
+        self._require_columns(sets, parameters)
+        for number in range(sets):
+            kind, own = model_of_set(self.model, number)
             try:
-                self.model.from_params(values)
+                kind.from_params(self.scene.intrinsics[number, own])
             except ValueError as error:
-                raise ValueError(f"intrinsics[{number}] make no {self.model.__name__}: {error}") from None
+                raise ValueError(f"intrinsics[{number}] make no {kind.__name__}: {error}") from None
         self._require_range("view", self.seen.view, views)
         self._require_range("point", self.seen.point, points)
         self._require_once()
@@ -190,6 +190,18 @@ class BundleProblem:
     def at(self, scene: Scene) -> Self:
         """Return the same problem with another scene of the same size."""
         return replace(self, scene=scene)
+
+    def _require_columns(self, sets: int, parameters: int) -> None:
+        model = self.model
+        if parameters != width(model):
+            names = model.models if isinstance(model, Families) else (model,)
+            needs = " and ".join(f"{kind.__name__} needs {', '.join(kind.names())}" for kind in names)
+            raise ValueError(f"intrinsics have {parameters} columns: {needs}")
+        if isinstance(model, Families):
+            if len(model.of_set) != sets:
+                raise ValueError(f"families of {len(model.of_set)} sets of intrinsics: there are {sets}")
+            if self.scene.intrinsics[~model.own].any():
+                raise ValueError("intrinsics: a set must be zero outside the block of its family")
 
     def _require_range(self, name: str, index: IntArray, count: int) -> None:
         bad = np.flatnonzero((index < 0) | (index >= count))
@@ -221,7 +233,7 @@ class BundleProblem:
 
 
 def freedom(
-    model: type[Camera],
+    model: CameraModel,
     scene: Scene,
     *,
     fixed_views: ArrayLike = (),
@@ -232,7 +244,7 @@ def freedom(
 
     Parameters
     ----------
-    model : type of Camera
+    model : type of Camera, or Families
     scene : Scene
     fixed_views, fixed_points : array_like of int
         Numbers of the views and points that stay where they are.
@@ -252,13 +264,7 @@ def freedom(
     array([[1., 1., 0., 0.],
            [0., 0., 1., 0.]])
     """
-    names = model.names()
-    basis = np.zeros((len(names), len(intrinsics)))
-    for column, name in enumerate(intrinsics):
-        members = ("fx", "fy") if name == "f" else (name,)
-        if not set(members) <= set(names):
-            raise ValueError(f"intrinsic {name!r}: {model.__name__} has f, {', '.join(names)}")
-        basis[[names.index(member) for member in members], column] = 1.0
+    basis = directions(model, intrinsics)
     pose = np.ones((len(scene.T_cam_world), 6), dtype=np.bool_)
     pose[np.asarray(fixed_views, dtype=np.int64)] = False
     point = np.ones(len(scene.X_world), dtype=np.bool_)

@@ -28,8 +28,9 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.estimation.bundle.families import CameraModel, Families, FamilyPart
 from vslam_ref.estimation.bundle.problem import BundleProblem
-from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan, pose_jacobian
+from vslam_ref.geometry.cameras import Pinhole, Radtan, pose_jacobian
 from vslam_ref.geometry.cameras import projection as cameras
 from vslam_ref.geometry.cameras.interface import MIN_DEPTH
 
@@ -79,7 +80,7 @@ class Linearised(NamedTuple):
     J_point: Array
 
 
-def is_polynomial(model: type[Camera]) -> bool:
+def is_polynomial(model: CameraModel) -> bool:
     """Whether a camera model is one of those written out here."""
     return model in (Pinhole, Radtan)
 
@@ -91,11 +92,25 @@ def polynomial_params(intrinsics: Array) -> Array:
     return padded
 
 
-def residuals(model: type[Camera], state: BundleState, links: Links) -> Residuals:
+def divided(part: FamilyPart, state: BundleState, links: Links) -> tuple[BundleState, Links]:
+    """What one family of lenses sees: the state with its block of intrinsics, and its observations."""
+    own = np.ascontiguousarray(state.intrinsics[:, part.columns])
+    rows = part.rows
+    view, point, lens = links.view[rows], links.point[rows], links.lens[rows]
+    return state._replace(intrinsics=own), Links(view, point, lens, links.uv[rows])
+
+
+def residuals(model: CameraModel, state: BundleState, links: Links) -> Residuals:
     """Residuals of all observations.
 
     Implements :eq:`eq-ba-residual`.
     """
+    if isinstance(model, Families):
+        whole = Residuals(np.zeros(links.uv.shape), np.zeros(len(links.uv), dtype=np.bool_))
+        for part in model.parts(links.lens):
+            found = residuals(part.model, *divided(part, state, links))
+            whole.r[part.rows], whole.valid[part.rows] = found
+        return whole
     if is_polynomial(model):
         params = polynomial_params(state.intrinsics)
         moving = (state.R_cam_world, state.t_cam_world, state.X_world, params)
@@ -133,19 +148,29 @@ def polynomial_residuals(
     return np.where(seen.front[:, None], seen.pixels() - uv, 0.0), seen.front
 
 
-def linearise(model: type[Camera], state: BundleState, links: Links, basis: Array) -> Linearised:
+def linearise(model: CameraModel, state: BundleState, links: Links, basis: Array) -> Linearised:
     """Residuals and Jacobians of all observations.
 
     Implements :eq:`eq-ba-jacobians`.
 
     Parameters
     ----------
-    model : type of Camera
+    model : type of Camera, or Families
     state : BundleState
     links : Links
     basis : ndarray, shape (p, q)
         Directions in which a set of intrinsics may move.
     """
+    if isinstance(model, Families):
+        n, q = len(links.uv), basis.shape[1]
+        whole = Linearised(
+            np.zeros((n, 2)), np.zeros(n, np.bool_), np.zeros((n, 2, 6 + q)), np.zeros((n, 2, 3))
+        )
+        for part in model.parts(links.lens):
+            found = linearise(part.model, *divided(part, state, links), basis[part.columns])
+            for all_rows, rows in zip(whole, found, strict=True):
+                all_rows[part.rows] = rows
+        return whole
     if is_polynomial(model):
         seen = _polynomial(state, links)
         return seen.linearised(links.uv, state.R_cam_world[links.view], basis)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
+from vslam_ref.estimation.bundle.families import camera_of, model_of_set
 from vslam_ref.estimation.bundle.lens_covariance import LensCovariance, lens_covariance, with_free_lens
 from vslam_ref.estimation.bundle.problem import BundleProblem
 from vslam_ref.estimation.bundle.result import BundleResult
@@ -69,7 +70,7 @@ class SelfCalibration(NamedTuple):
     def camera(self) -> Camera:
         """The camera that was found."""
         problem = self.result.problem
-        return problem.model.from_params(problem.scene.intrinsics[0])
+        return camera_of(problem.model, problem.scene.intrinsics, 0)
 
 
 def self_calibrate(
@@ -106,7 +107,7 @@ def self_calibrate(
     ValueError
         On a name that the model has not, or views with lenses of their own.
     """
-    known = problem.model.names()
+    known = model_of_set(problem.model, 0)[0].names()
     unknown = [name for name in names if name not in known]
     if unknown or len(problem.scene.intrinsics) != 1:
         raise ValueError(f"need one lens and some of {', '.join(known)}; got {', '.join(names)}")
@@ -145,7 +146,7 @@ def _worst(shift: Array, certain: LensCovariance, most_px: float) -> int | None:
 
 def _shift_per_unit(problem: BundleProblem, size: tuple[int, int]) -> Array:
     """Largest shift in the picture, pixels, for one unit of each intrinsic (p,)."""
-    camera = problem.model.from_params(problem.scene.intrinsics[0])
+    camera = camera_of(problem.model, problem.scene.intrinsics, 0)
     rays = camera.unproject(_grid(size))
     at = camera.project_with_jacobians(rays.bearing[rays.valid])
     length = np.linalg.norm(at.J_intrinsics[at.valid], axis=1)
@@ -161,7 +162,7 @@ def _grid(size: tuple[int, int]) -> Array:
 
 def _astray(start: BundleResult, found: BundleResult, size: tuple[int, int]) -> str:
     """Why an adjustment is not believed, or nothing."""
-    camera = found.problem.model.from_params(found.problem.scene.intrinsics[0])
+    camera = camera_of(found.problem.model, found.problem.scene.intrinsics, 0)
     if not np.isfinite(found.cost) or found.cost > start.cost:
         return "the cost did not fall"
     inliers, before = (np.count_nonzero(each.weights) for each in (found, start))

@@ -9,7 +9,8 @@ The system of one step has an arrow's shape.  With the views first and the point
 
 *Columns.*  View i owns up to 6 + q columns of the reduced system: its pose and, unless other views share its
 lens, the q free directions of its intrinsics.  Shared lenses have their columns behind all views.  Fixed
-coordinates have none: they get the number ``size``, a column that is computed and thrown away.
+coordinates have none: they get the number ``size``, a column that is computed and thrown away.  So do
+directions that a set of another family does not have.
 
 *Orders.*  Views are renumbered by reverse Cuthill-McKee on "see a point in common", which gathers the reduced
 system near its diagonal.  Points are ordered by their first view, so that a chunk of them touches few
@@ -23,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.estimation.bundle.families import own_columns
 from vslam_ref.estimation.bundle.problem import BundleProblem, Observations
 from vslam_ref.estimation.bundle.projection import BundleState, Links
 from vslam_ref.estimation.bundle.weights import whitener
@@ -142,7 +144,8 @@ def _columns(problem: BundleProblem, rank: IntArray) -> tuple[IntArray, int, int
     shared = bool(np.bincount(problem.lens_of_view, minlength=sets).max(initial=0) > 1)
     free = np.ones((views, 6 + q), dtype=np.bool_)
     free[:, :6] = problem.free.pose
-    free[:, 6:] = not shared
+    moves = _moves(problem)
+    free[:, 6:] = False if shared else moves[problem.lens_of_view]
     by_rank = np.argsort(rank)
     numbers = np.cumsum(free[by_rank].ravel()).reshape(views, 6 + q) - 1
     columns = np.empty((views, 6 + q), dtype=np.int64)
@@ -150,14 +153,18 @@ def _columns(problem: BundleProblem, rank: IntArray) -> tuple[IntArray, int, int
     border = int(free.sum())
     size = border
     if shared:
-        used = np.unique(problem.lens_of_view)
-        place = np.zeros(sets, dtype=np.int64)
-        place[used] = np.arange(len(used))
-        columns[:, 6:] = border + q * place[problem.lens_of_view][:, None] + np.arange(q)
-        free[:, 6:] = True
-        size += q * len(used)
+        moves[np.bincount(problem.lens_of_view, minlength=sets) == 0] = False
+        columns[:, 6:] = border + (np.cumsum(moves.ravel()).reshape(sets, q) - 1)[problem.lens_of_view]
+        free[:, 6:] = moves[problem.lens_of_view]
+        size += int(moves.sum())
     columns[~free] = size
     return columns, border, size
+
+
+def _moves(problem: BundleProblem) -> BoolArray:
+    """Which free directions move each set of intrinsics, (L, q): those with an entry in its own columns."""
+    own = own_columns(problem.model, len(problem.scene.intrinsics))
+    return np.asarray((own[:, :, None] & (problem.free.intrinsics != 0.0)).any(1))
 
 
 def _whitener(seen: Observations) -> Array:

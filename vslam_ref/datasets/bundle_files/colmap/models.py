@@ -31,8 +31,48 @@ MODELS = {
     "RADIAL_FISHEYE": Model(Fisheye, (*SIMPLE, "k1", "k2")),
     "OPENCV_FISHEYE": Model(Fisheye, (*SENSOR, "k1", "k2", "k3", "k4")),
     "FOV": Model(Fov, (*SENSOR, "omega")),
+    "SIMPLE_FISHEYE": Model(Fisheye, SIMPLE),
+    "FISHEYE": Model(Fisheye, SENSOR),
 }
 """By COLMAP's names; the parameter ``f`` is fx and fy."""
+
+NEW = ("SIMPLE_FISHEYE", "FISHEYE")
+"""Of COLMAP 4: what older versions cannot read is written only where it was read."""
+
+FOREIGN = {
+    "THIN_PRISM_FISHEYE": 12,
+    "RAD_TAN_THIN_PRISM_FISHEYE": 16,
+    "SIMPLE_DIVISION": 4,
+    "DIVISION": 5,
+    "EUCM": 6,
+    "EQUIRECTANGULAR": 2,
+}
+"""COLMAP's models that no camera here can say, and how many parameters each has."""
+
+NEAREST = {
+    "THIN_PRISM_FISHEYE": "OPENCV_FISHEYE",
+    "RAD_TAN_THIN_PRISM_FISHEYE": "OPENCV_FISHEYE",
+    "SIMPLE_DIVISION": "SIMPLE_RADIAL",
+    "DIVISION": "OPENCV",
+    "EUCM": "OPENCV_FISHEYE",
+}
+"""The supported model that comes closest to it."""
+
+BY_NUMBER = (
+    *(
+        "SIMPLE_PINHOLE",
+        "PINHOLE",
+        "SIMPLE_RADIAL",
+        "RADIAL",
+        "OPENCV",
+        "OPENCV_FISHEYE",
+        "FULL_OPENCV",
+        "FOV",
+    ),
+    *("SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE"),
+    *("SIMPLE_DIVISION", "DIVISION", "SIMPLE_FISHEYE", "FISHEYE", "EUCM", "EQUIRECTANGULAR"),
+)
+"""The binary form's MODEL_ID is the place in this list."""
 
 POLYNOMIAL = (Pinhole, Radtan, Rational)
 """Each can say all that those before it say."""
@@ -47,6 +87,17 @@ def common_model(names: Iterable[str]) -> type[Camera] | None:
     if wanted <= set(POLYNOMIAL):
         return max(wanted, key=POLYNOMIAL.index)
     return wanted.pop() if len(wanted) == 1 else None
+
+
+def count_of_params(name: str) -> int:
+    """How many parameters a model of COLMAP's has.
+
+    Examples
+    --------
+    >>> count_of_params("OPENCV"), count_of_params("DIVISION")
+    (8, 5)
+    """
+    return len(MODELS[name].parameters) if name in MODELS else FOREIGN[name]
 
 
 def params_from_colmap(name: str, values: Iterable[float], model: type[Camera]) -> Array:
@@ -84,7 +135,8 @@ def params_to_colmap(model: type[Camera], params: Array, preferred: str = "") ->
         ours["f"] = ours["fx"]
     ours["cx"], ours["cy"] = ours["cx"] + HALF, ours["cy"] + HALF
     family = POLYNOMIAL if model in POLYNOMIAL else (model,)
-    able = [name for name, kind in MODELS.items() if kind.ours in family and _can_say(name, ours)]
+    names = [name for name in MODELS if name not in NEW or name == preferred]
+    able = [name for name in names if MODELS[name].ours in family and _can_say(name, ours)]
     if not able:
         raise ValueError(f"COLMAP has no camera model for {model.__name__}")
     name = preferred if preferred in able else min(able, key=lambda name: len(MODELS[name].parameters))
