@@ -105,6 +105,19 @@ def test_the_unit_of_either_file_is_named(factor: float, unit: str) -> None:
     assert f"look like {unit}: divided by {factor:.0f}, and with --offset 1403636580, 400 of 400" in message
 
 
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
+)
+def test_a_unit_that_both_files_have_is_told_by_the_steps(factor: float, unit: str) -> None:
+    truth = walk(start=0.0)
+    late = similar(truth)
+    jitter = np.random.default_rng(3).uniform(-0.004, 0.004, 400)
+    assert truth.times is not None
+    shaken = Trajectory(np.sort(truth.times + jitter), late.t_world_body, late.R_world_body)
+    message = told(times_in(shaken, factor), times_in(truth, factor))
+    assert f"the times of both look like {unit}: divide both by {factor:.0f}" in message
+
+
 def test_clocks_that_differ_by_less_than_a_step_have_two_remedies() -> None:
     truth = walk()
     message = told(similar(truth).later(0.02), truth)
