@@ -204,6 +204,18 @@ def test_another_clock_is_named_beside_pairs_only_if_it_explains_more() -> None:
     assert "200 after the truth ends" in only
 
 
+def test_on_laps_no_other_clock_is_named() -> None:
+    """Two of three laps lie before the truth begins; an offset of laps would pair them all, and be wrong."""
+    t = np.arange(0, 60, 0.05)
+    angle = 2 * np.pi * t / 20
+    laps = np.stack([np.cos(angle), np.sin(angle) * (1 + 0.3 * np.cos(angle)), 0 * t], axis=1)
+    path = Trajectory(t, laps, np.tile(np.eye(3), (len(t), 1, 1)))
+    truth = part(path, 800, 1200)
+    estimate = similar(path, noise=0.005)
+    (note,) = pairing_notes(estimate, truth, pair_up(estimate, truth), MAX_DIFFERENCE)
+    assert "800 before the truth begins" in note
+
+
 def test_an_estimate_of_a_small_part_is_told() -> None:
     truth = walk()
     notes = {

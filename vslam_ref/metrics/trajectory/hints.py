@@ -11,7 +11,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.metrics.trajectory.association import Pairs, associate
 from vslam_ref.metrics.trajectory.ate import LEAST_PAIRS
-from vslam_ref.metrics.trajectory.clocks import UNIT_NAMES, Meeting, meeting, shape_misfit
+from vslam_ref.metrics.trajectory.clocks import AS_GOOD, UNIT_NAMES, Meeting, meeting, shape_misfit
 from vslam_ref.metrics.trajectory.partners import left_out, median_step, percent, reasons, rounded_up
 from vslam_ref.metrics.trajectory.poses import Trajectory
 
@@ -69,6 +69,8 @@ def _is_better(other: Meeting, estimate: Trajectory, truth: Trajectory, pairs: P
     if (other.factor, other.offset) == (1.0, 0.0) or other.pairs < len(pairs.truth):
         return False
     misfit = shape_misfit(estimate, truth, pairs)
+    if misfit <= AS_GOOD:  # the pairs have the right shape: on laps another offset has it, too
+        return False
     return other.misfit <= BETTER * misfit or (other.pairs >= 2 * len(pairs.truth) and other.misfit <= misfit)
 
 
