@@ -205,15 +205,17 @@ def test_another_clock_is_named_beside_pairs_only_if_it_explains_more() -> None:
 
 
 def test_on_laps_no_other_clock_is_named() -> None:
-    """Two of three laps lie before the truth begins; an offset of laps would pair them all, and be wrong."""
-    t = np.arange(0, 60, 0.05)
+    """Three laps, of which the truth has most of the last and two more: an offset of laps would pair them."""
+    t = np.arange(0, 100, 0.05)
     angle = 2 * np.pi * t / 20
     laps = np.stack([np.cos(angle), np.sin(angle) * (1 + 0.3 * np.cos(angle)), 0 * t], axis=1)
     path = Trajectory(t, laps, np.tile(np.eye(3), (len(t), 1, 1)))
-    truth = part(path, 800, 1200)
-    estimate = similar(path, noise=0.005)
-    (note,) = pairing_notes(estimate, truth, pair_up(estimate, truth), MAX_DIFFERENCE)
-    assert "800 before the truth begins" in note
+    truth, noise = part(path, 900, 2000), np.random.default_rng(5).normal(scale=0.005, size=(300, 3))
+    found = laps[:1200] + np.concatenate([np.zeros((900, 3)), noise])  # where they overlap it is at its worst
+    estimate = Trajectory(t[:1200], found, path.R_world_body[:1200])
+    left, covered = pairing_notes(estimate, truth, pair_up(estimate, truth), MAX_DIFFERENCE)
+    assert "900 before the truth begins" in left
+    assert "covers 27 %" in covered
 
 
 def test_an_estimate_of_a_small_part_is_told() -> None:
