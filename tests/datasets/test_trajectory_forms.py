@@ -233,7 +233,7 @@ def test_lost_lines_of_matrices_keep_the_places_of_the_others(tmp_path: Path) ->
 def test_matrices_of_four_rows_are_read(tmp_path: Path) -> None:
     text = "\n".join(f"0 -1 0 {k} 1 0 0 2 0 0 1 3 0 0 0 1" for k in range(3))
     file = trajectories.read(put(tmp_path, text))
-    assert (file.format, file.notes) == ("kitti", ())
+    assert (file.format, file.notes) == ("kitti", ("16 columns: the last four, 0 0 0 1, are not read",))
     assert file.trajectory.t_world_body.tolist() == [[0, 2, 3], [1, 2, 3], [2, 2, 3]]
     assert file.trajectory.R_world_body[0].tolist() == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     with pytest.raises(FormatError, match=r":1: 16 columns; expected 12"):
@@ -301,6 +301,16 @@ def test_a_first_line_of_words_that_name_no_pose_is_told(tmp_path: Path) -> None
     assert file.notes == (
         "line 1 (a b c d e f g h) names no pose: the columns are taken to be in the usual order",
     )
+
+
+def test_separators_that_change_are_told(tmp_path: Path) -> None:
+    """Two files put together: as TUM's own program does, both are read."""
+    lines = table().splitlines()
+    file = trajectories.read(
+        put(tmp_path, "\n".join([*lines[:5], *(x.replace(" ", ",") for x in lines[5:])]))
+    )
+    same(file)
+    assert file.notes == ("separators change, first at line 6: read as if they were the same",)
 
 
 def test_names_of_velocities_and_biases_are_no_positions() -> None:

@@ -105,6 +105,19 @@ def test_the_unit_of_either_file_is_named(factor: float, unit: str) -> None:
     assert f"look like {unit}: divided by {factor:.0f}, and with --offset 1403636580, 400 of 400" in message
 
 
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
+)
+def test_a_unit_that_both_files_have_is_told_by_the_steps(factor: float, unit: str) -> None:
+    truth = walk(start=0.0)
+    late = similar(truth)
+    jitter = np.random.default_rng(3).uniform(-0.004, 0.004, 400)
+    assert truth.times is not None
+    shaken = Trajectory(np.sort(truth.times + jitter), late.t_world_body, late.R_world_body)
+    message = told(times_in(shaken, factor), times_in(truth, factor))
+    assert f"the times of both look like {unit}: divide both by {factor:.0f}" in message
+
+
 def test_clocks_that_differ_by_less_than_a_step_have_two_remedies() -> None:
     truth = walk()
     message = told(similar(truth).later(0.02), truth)
@@ -189,6 +202,20 @@ def test_another_clock_is_named_beside_pairs_only_if_it_explains_more() -> None:
     right = similar(walk(30.0))
     (only,) = pairing_notes(right, truth, pair_up(right, truth), MAX_DIFFERENCE)
     assert "200 after the truth ends" in only
+
+
+def test_on_laps_no_other_clock_is_named() -> None:
+    """Three laps, of which the truth has most of the last and two more: an offset of laps would pair them."""
+    t = np.arange(0, 100, 0.05)
+    angle = 2 * np.pi * t / 20
+    laps = np.stack([np.cos(angle), np.sin(angle) * (1 + 0.3 * np.cos(angle)), 0 * t], axis=1)
+    path = Trajectory(t, laps, np.tile(np.eye(3), (len(t), 1, 1)))
+    truth, noise = part(path, 900, 2000), np.random.default_rng(5).normal(scale=0.005, size=(300, 3))
+    found = laps[:1200] + np.concatenate([np.zeros((900, 3)), noise])  # where they overlap it is at its worst
+    estimate = Trajectory(t[:1200], found, path.R_world_body[:1200])
+    left, covered = pairing_notes(estimate, truth, pair_up(estimate, truth), MAX_DIFFERENCE)
+    assert "900 before the truth begins" in left
+    assert "covers 27 %" in covered
 
 
 def test_an_estimate_of_a_small_part_is_told() -> None:

@@ -36,9 +36,9 @@ them, and :func:`write` gives them back.
 if a program was stopped while it wrote it.
 """
 
+from vslam_ref.datasets.trajectories.columns import UNIT_TOLERANCE
 from vslam_ref.datasets.trajectories.formats import FORMATS, AsRead, TrajectoryFile
 from vslam_ref.datasets.trajectories.reading import (
-    UNIT_TOLERANCE,
     detect,
     read,
     read_euroc,

@@ -4,31 +4,20 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.text import Columns, FormatError, is_number, number
+from vslam_ref.datasets.text import Columns, FormatError, number
 from vslam_ref.datasets.trajectories import telling
-from vslam_ref.datasets.trajectories.formats import EUROC, KITTI, TUM, AsRead, TrajectoryFile, matrices
-from vslam_ref.datasets.trajectories.names import Layout
+from vslam_ref.datasets.trajectories.columns import UNIT_TOLERANCE, format_of, is_matrix, pose_columns
+from vslam_ref.datasets.trajectories.formats import KITTI, AsRead, TrajectoryFile, matrices
 from vslam_ref.datasets.trajectories.rows import CUT, WordTable, is_lost, read_rows
-from vslam_ref.datasets.trajectories.stamps import is_whole, read_stamps, unit_of
+from vslam_ref.datasets.trajectories.stamps import read_stamps
 from vslam_ref.metrics.trajectory.poses import Trajectory
-
-UNIT_TOLERANCE = 1e-3
-"""Four decimals of a quaternion move its length by 1e-4 at most, four of a matrix R^T R by 2e-4."""
 
 LONGEST = 1e12
 """Metres; a position must be smaller (the solar system is)."""
-
-WIDE = (8, 11, 17)
-"""Columns of known files with commas: pose; with velocity (VINS); with velocity and biases (EuRoC)."""
-ORDERS = {"tum": (1, 2, 3, 7, 4, 5, 6), "euroc": (1, 2, 3, 4, 5, 6, 7)}
-"""Columns of tx, ty, tz, qw, qx, qy, qz."""
-LOOKED_AT = 50
-"""Lines that are looked at to see what the columns are."""
 
 
 def read(path: Path, format: str | None = None) -> TrajectoryFile:
@@ -52,7 +41,7 @@ def read(path: Path, format: str | None = None) -> TrajectoryFile:
     if format is not None and format not in READERS:
         raise ValueError(f"trajectory format {format!r}: need one of {', '.join(READERS)}")
     rows = read_rows(path)
-    chosen = _format(rows) if format is None else format
+    chosen = format_of(rows) if format is None else format
     return _read_kitti(rows) if chosen == "kitti" else _read_poses(rows, chosen)
 
 
@@ -64,7 +53,7 @@ def detect(path: Path) -> str:
     FormatError
         If it fits no format, or there is no data.
     """
-    return _format(read_rows(path))
+    return format_of(read_rows(path))
 
 
 def read_tum(path: Path) -> TrajectoryFile:
@@ -93,118 +82,13 @@ def nanoseconds(path: Path, line: int, word: str) -> int:
     return int(word)
 
 
-# --- which columns ---------------------------------------------------------------------------------
-
-
-def _format(rows: WordTable) -> str:
-    """Format of a table: by its header, else by the number of columns, then by separators and times."""
-    if rows.header is None:
-        count = len(rows.words[0])
-        if count in (12, 16) and _is_matrix(rows, count):
-            return "kitti"
-        if count < len(TUM):
-            right = "expected 8 (TUM), 12 (KITTI), or 8 with commas (EuRoC)"
-            why = _short(count) if is_number(rows.words[0][0]) else ""
-            raise FormatError(rows.path, rows.lines[0], f"{count} columns; {right}{why}")
-    if not rows.commas or (rows.header is not None and len(rows.header.time) == 2):
-        return "tum"
-    column = rows.header.time[0] if rows.header else 0
-    words = [row[column] for row in rows.words]
-    if not all(map(is_whole, words[:LOOKED_AT])):
-        usual = "s"
-    else:
-        usual = "ns"
-    stated = rows.header.unit if rows.header else None
-    known = [float(word) for word in words if is_whole(word)]
-    unit = stated or (unit_of(np.array(known), usual) if known else usual)
-    return "euroc" if unit == "ns" else "tum"
-
-
-def _short(count: int) -> str:
-    """What may be wrong with a line of few columns."""
-    if count == 7:
-        return "; is the time missing?"
-    if count in (3, 4):
-        return "; positions alone are no poses: add 0 0 0 1 where the rotation is not known"
-    return ""
-
-
-def _is_matrix(rows: WordTable, count: int) -> bool:
-    """Whether the first line that can be read has a rotation's columns, and, of 16, the last row 0 0 0 1."""
-    values = _known(rows, range(count))
-    if values is None:
-        return True
-    if count == 16 and values[12:].tolist() != [0, 0, 0, 1]:
-        return False
-    R = values[:12].reshape(3, 4)[:, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
-        return (
-            bool(np.abs(R.T @ R - np.eye(3)).max() < 0.5)
-            or not abs(_length(values[4:8]) - 1) < UNIT_TOLERANCE
-        )
-
-
-def _known(rows: WordTable, columns: range | tuple[int, ...]) -> Array | None:
-    """The numbers in some columns of the first line in which all can be read."""
-    for words in rows.words[:LOOKED_AT]:
-        try:
-            values = np.array([float(words[k]) for k in columns])
-        except ValueError:
-            continue
-        if np.isfinite(values).all() and values[-4:].any():
-            return values
-    return None
-
-
-def _length(q: Array) -> float:
-    with np.errstate(over="ignore"):
-        return float(np.linalg.norm(q))
-
-
-class _Chosen(NamedTuple):
-    """Columns that are read, and what is to be told about them."""
-
-    layout: Layout
-    notes: tuple[str, ...]
-
-
-def _columns(rows: WordTable, format: str) -> _Chosen:
-    """Columns of a pose: those of the header, else the usual ones; one number more may stand before them."""
-    if rows.header is not None:
-        return _Chosen(rows.header, ())
-    count, names = len(rows.words[0]), EUROC if format == "euroc" else TUM
-    if count < len(names):
-        what = f"{count} columns; expected {len(names)}: {', '.join(names)}{_short(count)}"
-        raise FormatError(rows.path, rows.lines[0], what)
-    pose = ORDERS[format]
-    if count in (WIDE if rows.commas else WIDE[:1]):
-        return _Chosen(Layout((0,), pose), ())
-    first = 0
-    for start in (0, 1) if is_whole(rows.words[0][0]) else (0,):
-        values = _known(rows, tuple(k + start for k in pose))
-        if values is not None and abs(_length(values[3:]) - 1) < UNIT_TOLERANCE:
-            first = start
-            break
-    told = telling.passed_over(count, first, names)
-    return _Chosen(Layout((first,), tuple(k + first for k in pose)), (told,))
-
-
-# --- poses -----------------------------------------------------------------------------------------
-
-
 def _read_poses(rows: WordTable, format: str) -> TrajectoryFile:
     """Poses with times: lost ones left out, in the order of time."""
-    (layout, odd) = _columns(rows, format)
+    layout, odd = pose_columns(rows, format)
     kept = [k for k, words in enumerate(rows.words) if not _lost(words, layout.pose)]
-    lost = (
-        [line for k, line in enumerate(rows.lines) if k not in set(kept)]
-        if len(kept) < len(rows.words)
-        else []
-    )
+    lost = sorted(set(rows.lines) - {rows.lines[k] for k in kept})
     if not kept:
-        raise FormatError(
-            rows.path, rows.lines[0], f"no pose in {len(rows.words)} lines: none has finite numbers"
-        )
+        raise _no_pose(rows)
     lines = [rows.lines[k] for k in kept]
     values = _numbers(rows, kept, layout.pose, ("tx", "ty", "tz", "qw", "qx", "qy", "qz"))
     usual = layout.unit or ("ns" if format == "euroc" else "s")
@@ -236,13 +120,11 @@ def _read_poses(rows: WordTable, format: str) -> TrajectoryFile:
 def _read_kitti(rows: WordTable) -> TrajectoryFile:
     """Matrices, line by line."""
     count = len(rows.words[0])
-    if count not in (12, 16) or (count == 16 and not _is_matrix(rows, count)):
+    if count not in (12, 16) or (count == 16 and not is_matrix(rows, count)):
         raise FormatError(rows.path, rows.lines[0], f"{count} columns; expected 12: {', '.join(KITTI)}")
     kept = [k for k, words in enumerate(rows.words) if not _lost(words, range(12))]
     if not kept:
-        raise FormatError(
-            rows.path, rows.lines[0], f"no pose in {len(rows.words)} lines: none has finite numbers"
-        )
+        raise _no_pose(rows)
     values = _numbers(rows, kept, range(12), KITTI)
     table = Columns(rows.path, values, np.array([rows.lines[k] for k in kept]))
     R = values.reshape(-1, 3, 4)[:, :, :3].copy()
@@ -257,11 +139,21 @@ def _read_kitti(rows: WordTable) -> TrajectoryFile:
         ),
     )
     gone = sorted(set(rows.lines) - set(table.lines.tolist()))
-    notes = (*rows.notes, *telling.lost(gone, len(rows.words)), *telling.matrices(float(off.max())))
+    notes = (
+        *rows.notes,
+        *(["16 columns: the last four, 0 0 0 1, are not read"] if count == 16 else []),
+        *telling.lost(gone, len(rows.words)),
+        *telling.matrices(float(off.max())),
+    )
     trajectory = Trajectory(None, _positions(table, (3, 7, 11)), R)
     return TrajectoryFile(
         trajectory, "kitti", AsRead(), float(off.max()), 0, notes, np.array(kept), len(rows.words)
     )
+
+
+def _no_pose(rows: WordTable) -> FormatError:
+    what = f"no pose in {len(rows.words)} lines: none has finite numbers"
+    return FormatError(rows.path, rows.lines[0], what)
 
 
 def _lost(words: list[str], columns: range | tuple[int, ...]) -> bool:

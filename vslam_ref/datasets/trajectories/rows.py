@@ -77,11 +77,11 @@ def read_rows(path: Path) -> WordTable:
         if not pairs:
             raise FormatError(path, None, "no data below the header; expected one pose a line")
         first, lines, kept = lines[0], [n for n, _ in pairs], [line for _, line in pairs]
-        commas, words = _same_columns(path, lines, kept, cut)
+        commas, words, mixed = _same_columns(path, lines, kept, cut)
         header, notes = _named(path, first, names, len(words[0]))
-        return WordTable(path, words, lines, commas, header, notes, cut)
-    commas, words = _same_columns(path, lines, kept, cut)
-    return WordTable(path, words, lines, commas, _of_comments(comments, len(words[0])), (), cut)
+        return WordTable(path, words, lines, commas, header, (*mixed, *notes), cut)
+    commas, words, mixed = _same_columns(path, lines, kept, cut)
+    return WordTable(path, words, lines, commas, _of_comments(comments, len(words[0])), mixed, cut)
 
 
 def _text(path: Path) -> str:
@@ -119,8 +119,13 @@ def _split(line: str) -> tuple[bool, list[str]]:
     return True, parts if all(part == "" or is_number(part) for part in parts) else words
 
 
-def _same_columns(path: Path, lines: list[int], kept: list[str], cut: int) -> tuple[bool, list[list[str]]]:
-    """Words of all lines, as many in each as in most; separators at the end go."""
+def _same_columns(
+    path: Path, lines: list[int], kept: list[str], cut: int
+) -> tuple[bool, list[list[str]], tuple[str, ...]]:
+    """Whether commas part the words; words of all lines, as many in each as in most; what is odd.
+
+    Separators at the end of a line go.
+    """
     split = [_split(line) for line in kept]
     count = Counter(_without_end(words) for _, words in split).most_common(1)[0][0]
     found = []
@@ -132,7 +137,9 @@ def _same_columns(path: Path, lines: list[int], kept: list[str], cut: int) -> tu
             what += CUT if number == cut and len(words) < count else ""
             raise FormatError(path, number, what)
         found.append(words)
-    return split[0][0], found
+    other = [number for number, (commas, _) in zip(lines, split, strict=True) if commas != split[0][0]]
+    told = f"separators change, first at line {other[0]}: read as if they were the same" if other else ""
+    return split[0][0], found, (told,) if told else ()
 
 
 def _without_end(words: list[str]) -> int:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.metrics.trajectory.association import Pairs
+from vslam_ref.arrays import Array
+from vslam_ref.metrics.trajectory.association import Pairs, associate
 from vslam_ref.metrics.trajectory.ate import LEAST_PAIRS
-from vslam_ref.metrics.trajectory.clocks import UNIT_NAMES, Meeting, meeting, shape_misfit
+from vslam_ref.metrics.trajectory.clocks import AS_GOOD, UNIT_NAMES, Meeting, meeting, shape_misfit
 from vslam_ref.metrics.trajectory.partners import left_out, median_step, percent, reasons, rounded_up
 from vslam_ref.metrics.trajectory.poses import Trajectory
 
@@ -18,6 +19,8 @@ WORTH_ASKING = 0.05
 """Share of poses left out from which another clock is looked for."""
 BETTER = 0.25
 """Another clock is named beside pairs only if it leaves this share of their misfit, or doubles the pairs."""
+SHORTEST, LONGEST = 2e-3, 5.0
+"""Seconds from a pose to the next, of a recorder and of keyframes: so a unit is told by the steps."""
 COVERED = 0.5
 """Share of the truth's time below which it is said that the estimate covers a part only."""
 
@@ -66,6 +69,8 @@ def _is_better(other: Meeting, estimate: Trajectory, truth: Trajectory, pairs: P
     if (other.factor, other.offset) == (1.0, 0.0) or other.pairs < len(pairs.truth):
         return False
     misfit = shape_misfit(estimate, truth, pairs)
+    if misfit <= AS_GOOD:  # the pairs have the right shape: on laps another offset has it, too
+        return False
     return other.misfit <= BETTER * misfit or (other.pairs >= 2 * len(pairs.truth) and other.misfit <= misfit)
 
 
@@ -112,6 +117,7 @@ def _why(estimate: Trajectory, truth: Trajectory, max_difference: float, offset:
             return f"{what}: were these written with too few digits?"
         if different < LEAST_PAIRS:
             return f"the {name} has too few poses"
+    assert estimate.times is not None
     assert truth.times is not None
     other = meeting(estimate, truth, max_difference)
     if other is not None:
@@ -119,7 +125,19 @@ def _why(estimate: Trajectory, truth: Trajectory, max_difference: float, offset:
         if options and other.factor == 1 and abs(other.offset) <= median_step(truth.times):
             told += f"; or, if the clocks are right, --max-difference {rounded_up(abs(other.offset))}"
         return told
+    if (unit := _unit_of_both(estimate.times, truth.times, max_difference)) is not None:
+        return f"the times of both look like {UNIT_NAMES[unit]}: divide both by {unit:.0f}"
     return "no unit of time and no offset was found that makes them meet: are they of the same recording?"
+
+
+def _unit_of_both(estimate: Array, truth: Array, max_difference: float) -> float | None:
+    """How many to a second the times of both are, if it is not one and they then meet."""
+    for unit in UNIT_NAMES:
+        steps = (median_step(np.unique(times)) / unit for times in (estimate, truth))
+        if all(SHORTEST <= step <= LONGEST for step in steps):
+            pairs = associate(estimate / unit, truth / unit, max_difference)
+            return unit if len(pairs.truth) >= LEAST_PAIRS else None
+    return None
 
 
 def words(other: Meeting, offset: float = 0.0, *, options: bool = True) -> str:

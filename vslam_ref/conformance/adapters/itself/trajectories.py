@@ -43,11 +43,14 @@ def _chain(steps: Array) -> Array:
 
 
 def _read(text: str, form: str) -> TrajectoryFile:
-    """The readers take files."""
+    """The readers take files, and read more than the formats allow; what they tell of is not the format."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trajectory.txt"
         path.write_text(text, encoding="utf-8")
-        return read(path, form)
+        found = read(path, form)
+    if found.notes:
+        raise ValueError(found.notes[0])
+    return found
 
 
 def _tum(text: str) -> dict[str, Any]:
