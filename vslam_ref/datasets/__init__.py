@@ -14,6 +14,7 @@ module                                      holds
 ``pictures``, ``checkerboard``              grey values, and the corners in them
 ``sequences``                               pictures in their order, with times, camera and truth
 ``middlebury``, ``matching``                pictures with exact cameras; the same points in several
-``grid_files``, ``video``                   occupancy maps and films
+``yaml_nodes``, ``storage_nodes``           YAML, and OpenCV's storage, as trees that know their lines
+``grid_files``, ``map_cells``, ``video``    occupancy maps, what their pixels mean, and films
 ==========================================  ============================================================
 """

@@ -87,9 +87,7 @@ def regular_point(corners: BoardCorners, size: tuple[int, int], free: Free) -> R
     -----
     A model whose lens is not free gets one for the fit, or the bend of the pictures would tilt the boards.
     """
-    focal = float(free.fixed.get("fx", max(size)))
-    sensor = (focal, focal * (free.aspect or 1.0), (size[0] - 1) / 2, (size[1] - 1) / 2)
-    usual = dict(zip(SENSOR, sensor, strict=True)) | dict(free.fixed)
+    usual = _usual(size, free)
     names = free.model.names()
     bare = all(name in usual for name in names)
     held = Free(Radtan, {n: usual[n] for n in SENSOR} | NO_MORE) if bare else Free(free.model, usual)
@@ -107,7 +105,14 @@ def regular_point(corners: BoardCorners, size: tuple[int, int], free: Free) -> R
     if point is None:
         return None
     cameras = (held.model.from_params(found.params), Pinhole(*(usual[name] for name in SENSOR)))
-    return RegularPoint(point, directions(corners, cameras, focal))
+    return RegularPoint(point, directions(corners, cameras, usual["fx"]))
+
+
+def _usual(size: tuple[int, int], free: Free) -> dict[str, float]:
+    """A usual sensor, and what is fixed."""
+    focal = float(free.fixed.get("fx", max(size)))
+    sensor = (focal, focal * (free.aspect or 1.0), (size[0] - 1) / 2, (size[1] - 1) / 2)
+    return dict(zip(SENSOR, sensor, strict=True)) | dict(free.fixed)
 
 
 def directions(
