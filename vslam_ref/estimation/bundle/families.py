@@ -118,7 +118,12 @@ def own_columns(model: CameraModel, sets: int) -> BoolArray:
 
 
 def parts_of(model: CameraModel, lens: IntArray) -> Iterator[FamilyPart]:
-    """Observations, whose sets of intrinsics are ``lens (n,)``, by camera model."""
+    """Observations, whose sets of intrinsics are ``lens (n,)``, by camera model.
+
+    Yields
+    ------
+    FamilyPart
+    """
     if isinstance(model, Families):
         yield from model.parts(lens)
     else:
