@@ -441,6 +441,7 @@ SAMPLES: dict[str, list[Sample]] = {
     "calibration_files.tum_mono:read_tum_mono": [Sample(_one("camera.txt", TUM_MONO), check=camera_wrong)],
     "carmen:read": [Sample(_one("corrected.log", CARMEN))],
     "pictures:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
+    "pictures:read_channels": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
     "pictures:read_picture": [Sample(_picture(".png"), binary=True), Sample(_picture(".jpg"), binary=True)],
     "grid_files:read_ros_map": [
         Sample(
