@@ -238,11 +238,12 @@ CARMEN = "# a comment\nPARAM laser_front_laser_resolution 1.0\n" + "".join(
 )
 LASER_HEAD = "4 -1.570796 3.141593 1.570796 30.0 0.01 0 3 1.5 2 3.5 2 11 12"
 ROBOT_LASER = "".join(
-    f"ROBOTLASER1 {LASER_HEAD} {k}.5 0.1 0.2 {k} 0 0.2 0.3 0.05 0.5 0.4 1000000 {976052857.3 + k:.1f} nohost {k}\n"
+    f"ROBOTLASER1 {LASER_HEAD} {k}.5 0.1 0.2 {k} 0 0.2 0.3 0.05 0.5 0.4 9 {976052857.3 + k:.1f} nohost {k}\n"
     for k in range(4)
 )
 RAW_LASER = "".join(
-    f"ODOM {k} 0 0.2 0 0 0 {976052857.1 + k:.1f} nohost 0\nRAWLASER1 {LASER_HEAD} {976052857.3 + k:.1f} nohost {k}\n"
+    f"ODOM {k} 0 0.2 0 0 0 {976052857.1 + k:.1f} nohost 0\n"
+    f"RAWLASER1 {LASER_HEAD} {976052857.3 + k:.1f} nohost {k}\n"
     for k in range(4)
 )
 ROS_MAP = """image: map.pgm
