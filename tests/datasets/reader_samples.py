@@ -309,6 +309,16 @@ CARMEN = "# a comment\nPARAM laser_front_laser_resolution 1.0\n" + "".join(
     f"ODOM {k} 0 0 0 0 0 0 nohost 0\n"
     for k in range(4)
 )
+LASER_HEAD = "4 -1.570796 3.141593 1.570796 30.0 0.01 0 3 1.5 2 3.5 2 11 12"
+ROBOT_LASER = "".join(
+    f"ROBOTLASER1 {LASER_HEAD} {k}.5 0.1 0.2 {k} 0 0.2 0.3 0.05 0.5 0.4 9 {976052857.3 + k:.1f} nohost {k}\n"
+    for k in range(4)
+)
+RAW_LASER = "".join(
+    f"ODOM {k} 0 0.2 0 0 0 {976052857.1 + k:.1f} nohost 0\n"
+    f"RAWLASER1 {LASER_HEAD} {976052857.3 + k:.1f} nohost {k}\n"
+    for k in range(4)
+)
 ROS_MAP = """image: map.pgm
 mode: trinary
 resolution: 0.05
@@ -439,7 +449,11 @@ SAMPLES: dict[str, list[Sample]] = {
         )
     ],
     "calibration_files.tum_mono:read_tum_mono": [Sample(_one("camera.txt", TUM_MONO), check=camera_wrong)],
-    "carmen:read": [Sample(_one("corrected.log", CARMEN))],
+    "carmen.reading:read": [
+        Sample(_one("corrected.log", CARMEN)),
+        Sample(_one("robot.log", ROBOT_LASER)),
+        Sample(_one("raw.log", RAW_LASER)),
+    ],
     "pictures:read_grey": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
     "pictures:read_channels": [Sample(_picture(".png"), binary=True), Sample(_picture(".pgm"), binary=True)],
     "pictures:read_picture": [Sample(_picture(".png"), binary=True), Sample(_picture(".jpg"), binary=True)],

@@ -10,7 +10,7 @@ import pytest
 
 from vslam_ref.datasets import carmen
 from vslam_ref.datasets.carmen.units import unit_note
-from vslam_ref.datasets.carmen.view import View, by_count, chosen, from_parameters
+from vslam_ref.datasets.carmen.view import LaserView, by_count, chosen, from_parameters
 from vslam_ref.datasets.text import FormatError
 
 STAMP = "10.5 host 0.5"
@@ -127,7 +127,7 @@ def test_parameters_of_others_say_nothing() -> None:
 
 
 def test_a_view_that_does_not_fit_its_beams_is_told() -> None:
-    found = chosen(541, View(None, 180.0, 0.5), 50.0, "the file's PARAM lines")
+    found = chosen(541, LaserView(None, 180.0, 0.5), 50.0, "the file's PARAM lines")
     assert found.notes == (
         "the file's PARAM lines: 180 degrees in steps of 0.5 are not 541 beams; the field of view is used "
         "(--fov tells another)",

@@ -66,6 +66,13 @@ def test_gzipped_files_read_the_same(mrclam_folder: Path) -> None:
         ("Robot1_Measurement.dat", "63 2.0", "63 -2.0", ":2", "range is -2; expected more than 0 m"),
         ("Robot1_Measurement.dat", "3.0 -0.2", "3.0 -20", ":5", "bearing is -20; expected radians"),
         ("Robot1_Measurement.dat", "100.2 5", "100.2 5.5", ":3", "barcode is 5.5; expected an integer"),
+        (
+            "Robot1_Odometry.dat",
+            "101.0 0.1",
+            "1.0 0.1",
+            ":4",
+            "time 1.000 s, out of order and more than 60 s",
+        ),
         ("Barcodes.dat", "7 81", "7 63", ":5", "barcode 63 again; line 4 has it already"),
     ],
 )
@@ -152,6 +159,10 @@ def test_lines_out_of_order_are_put_in_order_and_told(mrclam_folder: Path) -> No
     np.testing.assert_array_equal(log.times, plain.times)
     np.testing.assert_array_equal(log.controls, plain.controls)
     assert [s.time for s in log.sightings] == [s.time for s in plain.sightings]
+    path = mrclam_folder / "Robot1_Measurement.dat"  # the line that is named is the file's
+    path.write_text(path.read_text().replace("100.9 63", "100.9 63.5"))
+    with pytest.raises(FormatError, match=r"Measurement.dat:3: barcode is 63.5"):
+        mrclam.read_log(mrclam_folder, 1)
     again = mrclam.read_truth(mrclam_folder, 1, log)
     np.testing.assert_array_equal(again.T_world_vehicle, truth.T_world_vehicle)
     assert len(again.notes) == 1

@@ -135,7 +135,7 @@ def test_bad_words_are_told_in_one_line(
         ("Robot1_Odometry.dat", 50, "1002.4 0.5"),
         ("Robot1_Odometry.dat", 50, "1002.4 0.5 nan"),
         ("Robot1_Odometry.dat", 50, "1.0 0.5 0.3"),
-        ("Robot1_Measurement.dat", 20, "1029.0 999 2.0 0.1"),
+        ("Robot1_Measurement.dat", 20, "1029.0 99.5 2.0 0.1"),
         ("Robot1_Groundtruth.dat", 50, "1002.4 0.5 0.3 0.3 0.3"),
     ],
 )

@@ -21,6 +21,8 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 MAX_BYTES = 64 * 2**20
 """Unpacked size at which reading stops; the largest known log of this kind has 3 MiB."""
 _PIECE = 2**20
+LONELY = 60.0
+"""Seconds: no buffer of a logger is so long."""
 LARGEST_INTEGER = 2**53
 """Beyond it a double does not hold every integer."""
 
@@ -231,12 +233,24 @@ def require_order(table: Columns, column: int, *, strict: bool = False) -> None:
 
 
 def sorted_by(table: Columns, column: int) -> tuple[Columns, int]:
-    """The rows in the order of their times, equal ones as they stand; how many stood behind a later one."""
+    """The rows in the order of their times, equal ones as they stand; how many stood behind a later one.
+
+    Raises
+    ------
+    FormatError
+        At a time that, out of order, lies more than :data:`LONELY` from all others: a damaged stamp.
+    """
     times = table.values[:, column]
     late = int(np.count_nonzero(times < np.maximum.accumulate(times)))
     if not late:
         return table, 0
     order = np.argsort(times, kind="stable")
+    step = np.diff(times[order], prepend=-np.inf, append=np.inf)
+    lonely = np.minimum(step[:-1], step[1:]) > LONELY
+    Columns(table.path, table.values[order], table.lines[order]).require(
+        ~lonely,
+        lambda k: f"time {times[order[k]]:.3f} s, out of order and more than {LONELY:g} s from all others",
+    )
     return Columns(table.path, table.values[order], table.lines[order]), late
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.datasets.carmen.view import View, degrees
+from vslam_ref.datasets.carmen.view import LaserView, degrees
 from vslam_ref.datasets.text import FormatError, is_number, number
 
 MAX_BEAMS = 4096
@@ -41,7 +41,7 @@ class Scanned(NamedTuple):
     ranges: Array
     pose: list[float] | None
     time: float
-    view: View | None
+    view: LaserView | None
     max_range: float | None
 
 
@@ -78,7 +78,7 @@ def odometry(path: Path, line: int, words: Sequence[str]) -> list[float]:
     return [number(path, line, words[i], n) for i, n in ((7, "ipc_time"), (1, "x"), (2, "y"), (3, "theta"))]
 
 
-def view_of(path: Path, line: int, words: Sequence[str]) -> View:
+def view_of(path: Path, line: int, words: Sequence[str]) -> LaserView:
     """Start angle, field of view and step of a ROBOTLASER1 or RAWLASER1 line."""
     start, field, step = (
         number(path, line, words[i] if i < len(words) else "", HEAD[i - 1]) for i in (2, 3, 4)
@@ -89,7 +89,9 @@ def view_of(path: Path, line: int, words: Sequence[str]) -> View:
         )
     in_degrees = degrees(field) == field or abs(field) > 2 * np.pi + 1e-3
     resolution = step if in_degrees else float(np.degrees(step))
-    return View(start if in_degrees else degrees(start), degrees(field), resolution if step > 0 else None)
+    return LaserView(
+        start if in_degrees else degrees(start), degrees(field), resolution if step > 0 else None
+    )
 
 
 def _with_head(

@@ -144,7 +144,7 @@ def _require_one_scanner(path: Path, kind: str, lines: list[int], scans: list[Sc
             raise FormatError(path, line, f"{what}; expected the same")
 
 
-def _scanner(path: Path, scan: Scanned, found: dict[str, Lines], told: float | None) -> view.Chosen:
+def _scanner(path: Path, scan: Scanned, found: dict[str, Lines], told: float | None) -> view.ChosenScanner:
     """The scanner, by what tells its view: the user, the messages, the parameters, the number of beams."""
     beams, limit = len(scan.ranges), min(scan.max_range or MAX_RANGE, MAX_RANGE)
     in_file, where = scan.view or _view_elsewhere(path, beams, found), "the messages of the laser"
@@ -156,14 +156,14 @@ def _scanner(path: Path, scan: Scanned, found: dict[str, Lines], told: float | N
             return view.by_count(beams, limit)
         return view.chosen(beams, in_file, limit, where)
     asked = view.degrees(told)
-    taken = view.chosen(beams, view.View(None, asked, None), limit, "--fov")
+    taken = view.chosen(beams, view.LaserView(None, asked, None), limit, "--fov")
     if in_file is None or in_file.field_of_view is None or abs(in_file.field_of_view - asked) < 0.5:
         return taken
     note = f"a field of view of {asked:g} degrees is taken as told; {where} say {in_file.field_of_view:g}"
-    return view.Chosen(taken.scanner, (*taken.notes, note))
+    return view.ChosenScanner(taken.scanner, (*taken.notes, note))
 
 
-def _view_elsewhere(path: Path, beams: int, found: dict[str, Lines]) -> view.View | None:
+def _view_elsewhere(path: Path, beams: int, found: dict[str, Lines]) -> view.LaserView | None:
     """The view that another message of the same laser tells, if it has as many beams and is whole."""
     for name in ("ROBOTLASER1", "RAWLASER1"):
         for line, words in found.get(name, [])[:1]:

@@ -32,7 +32,7 @@ PARAMETER = re.compile(r"(?:laser|robot)_(?:front_?laser|laser1)_(?:laser_)?(fov
                        r"laser_front_laser_(fov|resolution|start_angle)$")  # fmt: skip
 
 
-class View(NamedTuple):
+class LaserView(NamedTuple):
     """Start angle, field of view and step as a file tells them: degrees; None for what it does not tell."""
 
     start: float | None
@@ -40,7 +40,7 @@ class View(NamedTuple):
     resolution: float | None
 
 
-class Chosen(NamedTuple):
+class ChosenScanner(NamedTuple):
     """A scanner, and sentences about what is odd in it."""
 
     scanner: LaserScanner
@@ -62,7 +62,7 @@ def degrees(value: float, most: float = 2 * np.pi + 1e-3) -> float:
     return float(whole) if abs(angle - whole) <= CLOSE else angle
 
 
-def from_parameters(parameters: Mapping[str, str]) -> View | None:
+def from_parameters(parameters: Mapping[str, str]) -> LaserView | None:
     """The view that lines such as ``PARAM laser_front_laser_fov 270`` tell; None where there is none."""
     told: dict[str, float] = {}
     for name, text in parameters.items():
@@ -77,14 +77,14 @@ def from_parameters(parameters: Mapping[str, str]) -> View | None:
     if not 0 < degrees(field) <= 360:
         return None
     start, step = told.get("start_angle"), told.get("resolution", 0.0)
-    return View(
+    return LaserView(
         None if start is None else degrees(start),
         degrees(field),
         step if step > 0 else None,  # CARMEN's table gives it in degrees
     )
 
 
-def chosen(beams: int, view: View, max_range: float, where: str) -> Chosen:
+def chosen(beams: int, view: LaserView, max_range: float, where: str) -> ChosenScanner:
     """The scanner of so many beams with a view whose field is known; ``where`` says who told it."""
     field, step = view.field_of_view or 180.0, view.resolution
     spans = (field / max(beams - 1, 1), field / beams)
@@ -100,10 +100,10 @@ def chosen(beams: int, view: View, max_range: float, where: str) -> Chosen:
             notes = (f"{where}: {said}; the field of view is used (--fov tells another)",)
             step = spans[0]
     start = -field / 2 if view.start is None else view.start
-    return Chosen(LaserScanner(beams, np.radians(start), np.radians(step), max_range), notes)
+    return ChosenScanner(LaserScanner(beams, np.radians(start), np.radians(step), max_range), notes)
 
 
-def by_count(beams: int, max_range: float) -> Chosen:
+def by_count(beams: int, max_range: float) -> ChosenScanner:
     """The scanner that a number of beams stands for, with a note where it may stand for several.
 
     Examples
@@ -112,16 +112,16 @@ def by_count(beams: int, max_range: float) -> Chosen:
     [True, True, False]
     """
     if beams in HALF_CIRCLE:
-        return Chosen(half_circle(beams, max_range), ())
+        return ChosenScanner(half_circle(beams, max_range), ())
     field = LIKELY.get(beams, 180.0)
     taken = (
         half_circle(beams, max_range)
         if field == 180.0
-        else chosen(beams, View(None, field, None), max_range, "").scanner
+        else chosen(beams, LaserView(None, field, None), max_range, "").scanner
     )
     others = [f for f in (100, 180, 190, 240, 270, 360) if f != field and _simple(f / max(beams - 1, 1))]
     may = f", it may be {' or '.join(map(str, others))}" if others else ""
-    return Chosen(
+    return ChosenScanner(
         taken,
         (
             f"the file does not tell the field of view of its {beams} beams: {field:g} degrees are taken"

@@ -58,12 +58,15 @@ class LinearPose:
 
 
 def no_pose(state: PoseState, method: str, spread: float = 1.0) -> LinearPose:
-    """The answer where there is no pose, with its reason."""
+    """The answer where there is no pose, with its reason; no unit."""
     return LinearPose(np.eye(4), state, method, spread)
 
 
 def checked_rays(bearings: ArrayLike, X_world: ArrayLike) -> tuple[Array, Array]:
-    """Bearings and points (N, 3) as arrays, or a ValueError that names what is wrong with them."""
+    """``bearings (N, 3)``, no unit, and ``X_world (N, 3)`` as arrays, or a ValueError that says why not.
+
+    Points in any unit, such as metres.
+    """
     b, X = as_array("bearings", bearings, 3), as_array("X_world", X_world, 3)
     if b.ndim != 2 or b.shape != X.shape:
         raise ValueError(f"bearings {b.shape} and X_world {X.shape}: need (N, 3) twice")

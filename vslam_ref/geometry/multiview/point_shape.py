@@ -54,7 +54,7 @@ def nearness(X_world: ArrayLike) -> Array:
 
 
 def point_shape(X: Array) -> tuple[Array, Array, Array, float]:
-    """Middle, extents along three axes (falling), the axes (rows), and the root mean square distance.
+    """Of ``X (N, 3)``: middle, extents along three axes (falling), axes (rows), root mean square distance.
 
     A far point is drawn near, towards the middle of the others: it leaves neither their plane nor their line.
     """
