@@ -6,9 +6,10 @@ There are three verdicts::
                   passed               lost digits              failed
 
 "Lost digits" stands between the other two, where a formula in common use is right, and cancellation takes
-digits that a user may not mind: an arc cosine near pi, 1 - (1 - u^2)^3 at tiny u.  It is the exception.  A case
-has it only if its tolerance has ``lost_digits``, with a reason of its own: the width is what that formula loses.
-An answer nearer to one of the case's known mistakes than to the right answer has failed, at any distance.
+digits that a user may not mind: an arc cosine near pi, 1 - (1 - u^2)^3 at tiny u.  It is the exception.
+A case has it only if its tolerance has ``lost_digits``, with a reason of its own: the width is what that
+formula loses.  An answer nearer to one of the case's known mistakes than to the right answer has failed, at
+any distance.
 """
 
 from __future__ import annotations
