@@ -12,6 +12,7 @@ import pkgutil
 from types import ModuleType
 
 HELPERS = (
+    "angles",
     "exact",
     "building",
     "curve_matches",

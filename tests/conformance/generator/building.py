@@ -113,6 +113,7 @@ class Topic:
         stem = f"{function}/{regime}"
         taken = sum(len(g["cases"]) for g in self.groups if g["stem"] == stem)
         rows = [{"id": f"{stem}-{taken + k:02d}", **case} for k, case in enumerate(cases, 1)]
+        rows = [{k: v for k, v in row.items() if k != "tolerance" or v != tolerance} for row in rows]
         group = {
             "stem": stem,
             "function": function,
@@ -124,7 +125,12 @@ class Topic:
         }
         if statistic is not None:
             group["statistic"] = statistic
-        self.groups.append(group)
+        head = {key: value for key, value in group.items() if key != "cases"}
+        same = [g for g in self.groups if {key: v for key, v in g.items() if key != "cases"} == head]
+        if same:
+            same[0]["cases"] += rows
+        else:
+            self.groups.append(group)
 
     def text(self) -> str:
         """The file, one case a line."""
