@@ -140,6 +140,11 @@ def rule_of(case: Case, profile: Profile) -> Rule:
     return rule._replace(lost_relative=float(lost["relative"]), lost_absolute=float(lost["absolute"]))
 
 
+def is_asked(case: Case, profile: Profile) -> bool:
+    """Whether a case makes sense in a profile: single precision cannot hold all inputs."""
+    return profile == "float64" or bool(case.tolerance["float32"].get("asked", True))
+
+
 def _outputs(
     expected: Mapping[str, Any], got: Mapping[str, Any], rule: Rule, kinds: Mapping[str, str]
 ) -> Difference:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Literal, NamedTuple
 
 from vslam_ref.conformance.catalogue import functions
-from vslam_ref.conformance.compare import Difference, Profile, compare, refused
+from vslam_ref.conformance.compare import Difference, Profile, compare, is_asked, refused
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.diagnose import diagnose, known_mistake
 from vslam_ref.conformance.program import Asked, Reply
@@ -135,6 +135,8 @@ def run(
     began, outcomes = time.perf_counter(), []
     for file in files:
         for case in file.cases:
+            if not is_asked(case, profile):
+                continue
             if progress is not None:
                 progress(case)
             outcomes.append(ask(asked, file, case, convention or Convention(), profile))

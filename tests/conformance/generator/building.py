@@ -65,6 +65,11 @@ def lost_digits(relative: float, reason: str, *, absolute: float = 0.0) -> dict[
     return {"relative": relative, "absolute": absolute, "reason": reason}
 
 
+def not_in_single(rule: dict[str, Any]) -> dict[str, Any]:
+    """Tolerance of cases whose inputs single precision cannot hold: they are not asked there."""
+    return {**rule, "float32": {**rule["float32"], "asked": False}}
+
+
 @dataclass
 class Topic:
     """A file in the making.
