@@ -100,6 +100,8 @@ def _wrapped(x: Array, wrong: str) -> Array:
 
 def update(x: Any, P: Any, ids: Any, z: Any, cov_z: Any, wrong: str = "") -> Answer:
     x, P, z, cov_z = arrays(x, P, z, cov_z)
+    if not len(ids):
+        return {"x": x, "P": P}
     if wrong == "one-at-a-time" and len(ids) > 1:
         for i, row in zip(ids, z, strict=True):
             x, P = update(x, P, [i], [row], cov_z).values()

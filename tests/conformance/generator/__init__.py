@@ -13,6 +13,9 @@ from types import ModuleType
 
 HELPERS = (
     "angles",
+    "ekf_sizes",
+    "lens_grid",
+    "solver_runs",
     "exact",
     "building",
     "curve_matches",

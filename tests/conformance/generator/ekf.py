@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator import exact_ekf
+from generator import ekf_sizes, exact_ekf
 from generator.building import Topic, tolerance
 from generator.exact_arrays import Big, big, doubles, stack
 from generator.exact_ekf import ideal_run
@@ -20,6 +20,8 @@ TOPIC, CHAPTER = "ekf", 15
 DEFINITION = "definition in 50 digits, Jacobians by difference quotients"
 PREDICTED = "sums of 7 x 7 products at most, each rounded by eps: 49 eps = 1.1e-14"
 UPDATED = "sums of 9 x 9 products behind an inverse of S of condition below 120: 9720 eps = 2.2e-12"
+BIG_MAP = "sums of 17 x 17 products at most, each rounded by eps: 289 eps = 6.4e-14"
+BIG_UPDATE = "sums of 17 x 17 products behind an inverse of S of condition below 300: 87000 eps = 2e-11"
 
 NOTES = {
     "gtpg": ("your predict computes G^T P G", "P <- F^T P F + G cov_u G^T"),
@@ -99,6 +101,9 @@ def build(rng: np.random.Generator) -> Topic:
     _new_landmarks(topic, rng)
     _polar(topic, rng)
     _traces(topic, rng)
+    ekf_sizes.predictions(topic, rng, tolerance(6e-14, BIG_MAP))
+    ekf_sizes.updates(topic, rng, tolerance(2e-11, BIG_UPDATE))
+    ekf_sizes.new_landmarks(topic, rng, tolerance(6e-14, BIG_MAP))
     return topic
 
 
