@@ -171,7 +171,7 @@ def nielsen_trace(
 
 def covariance(J: Array, r: Array, wrong: str | None = None) -> Array:
     m, n = J.shape
-    if m <= n:
+    if m <= n or np.linalg.matrix_rank(J) < n:
         raise ValueError("no residual is left over")
     noise = {"divided-by-m": r @ r / m, "noise-of-one": 1.0}.get(wrong or "", r @ r / (m - n))
     root = np.linalg.pinv(J)

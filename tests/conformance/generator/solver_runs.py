@@ -92,7 +92,7 @@ def run(
         gain = (cost - new) / promised
         taken = gain > 0 or wrong == "always-taken"
         clear = clear and promised > mpf("1e-6") * cost and not 0 <= gain < mpf("0.01")
-        clear = clear and spread < mpf("1e4") and abs(trial[1]) < 50
+        clear = clear and spread < mpf("1e4") and abs(trial[1]) < 50 and abs(gain) < 100
         steps.append({"cost": new if taken else cost, "gain": gain, "damping": lam, "taken": taken})
         if taken:
             power = 2 if wrong == "factor-not-cubed" else 3
