@@ -99,7 +99,7 @@ def build(rng: np.random.Generator) -> Topic:
 
 COSINE = "(1 - cos a)/a^2 loses eps/a"
 QUARTIC = "(1 - a^2/2 - cos a)/a^4, or a sin a/(1 - cos a), loses eps/a^2"
-HALF = "1 + cos a, or R - R^T over sin a, near a half turn: eps over the distance from pi"
+HALF = "1 + cos a, or R - R^T over the sine of an arc cosine, near a half turn: eps over its squared distance"
 SHIFTS = np.array([[1.5, -0.4, 0.8], [-0.6, 2.2, -1.1]])
 
 
@@ -107,7 +107,7 @@ def _losing(rule: dict[str, Any], xi: Array, power: int, *, half: bool = False) 
     """Tolerance of a case with the digits that a common formula loses at small angles, or near pi."""
     a = float(np.linalg.norm(xi[3:]))
     if half and a > 2.0:
-        return losing(rule, abs(np.pi - a), 1, HALF)
+        return losing(rule, abs(np.pi - a), 2, HALF)
     return losing(rule, a, power, COSINE if power == 1 else QUARTIC)
 
 

@@ -109,7 +109,7 @@ def _every_size(topic: Topic, fine: dict[str, Any]) -> None:
 def _losing(rule: dict[str, Any], xi: Array) -> dict[str, Any]:
     angle, sigma = float(np.linalg.norm(xi[3:6])), abs(float(xi[6]))
     if np.pi - angle < 0.2:
-        return losing(rule, np.pi - angle, 1, "R - R^T over sin a near a half turn")
+        return losing(rule, np.pi - angle, 2, "R - R^T over the sine of an arc cosine near a half turn")
     return losing(rule, min(angle, sigma), 1, DIFFERENCE)
 
 
