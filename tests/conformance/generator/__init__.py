@@ -13,6 +13,7 @@ from types import ModuleType
 
 HELPERS = (
     "angles",
+    "ekf_others",
     "ekf_sizes",
     "lens_grid",
     "solver_runs",

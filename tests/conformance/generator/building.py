@@ -13,13 +13,16 @@ import numpy as np
 from vslam_ref.conformance.vectors_format import CONVENTION
 
 VERSION = "0.1.0"
-CHANGED = dict.fromkeys(
-    (
-        *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss", "least_squares"),
-        *("bundle", "format", "trajectory"),
+CHANGED = {
+    **dict.fromkeys(("format", "trajectory"), "0.1.1"),  # random inputs of 12 digits
+    **dict.fromkeys(
+        (
+            *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss"),
+            *("least_squares", "bundle", "vehicle", "ekf", "range_bearing", "consistency", "grid"),
+        ),
+        "0.2.0",  # regimes filled: every size, special values, sizes of maps; digits that may be lost
     ),
-    "0.1.1",  # random inputs of 12 digits
-)
+}
 """Topic -> its version, where its numbers have changed since VERSION."""
 FORMAT = 1
 

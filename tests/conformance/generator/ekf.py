@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator import ekf_sizes, exact_ekf
+from generator import ekf_others, ekf_sizes, exact_ekf
 from generator.building import Topic, tolerance
 from generator.exact_arrays import Big, big, doubles, stack
 from generator.exact_ekf import ideal_run
@@ -86,6 +86,9 @@ NOTES = {
         "you convert range and bearing without the correction of bias; its covariance is that of first order",
         "z = r (cos b, sin b), cov = R diag(sigma_range^2, r^2 sigma_bearing^2) R^T",
     ),
+    "pose-noise-turned": ("you turn the pose's noise by the heading; it is given in the world", "R Q R^T"),
+    "noise-alone": ("your distance leaves out the state's covariance", "e^T cov_z^-1 e"),
+    "distance-not-squared": ("your distance is the root of what was asked for", "(e^T S^-1 e)^(1/2)"),
     "process-noise-as-sensor-noise": (
         "your update uses the control's covariance where the sensor's belongs",
         "S = H P H^T + cov_u",
@@ -104,6 +107,8 @@ def build(rng: np.random.Generator) -> Topic:
     ekf_sizes.predictions(topic, rng, tolerance(6e-14, BIG_MAP))
     ekf_sizes.updates(topic, rng, tolerance(2e-11, BIG_UPDATE))
     ekf_sizes.new_landmarks(topic, rng, tolerance(6e-14, BIG_MAP))
+    ekf_others.additive(topic, rng)
+    ekf_others.gates(topic, rng)
     return topic
 
 
