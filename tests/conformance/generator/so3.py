@@ -112,7 +112,10 @@ def _every_size(topic: Topic) -> None:
         a = abs((GRID + BEYOND)[k])
         case = {**_exp(phi), "tolerance": fine if a < np.pi else squared}
         topic.group("so3.exp", "eq-rodrigues", SERIES, fine, [case], flags=flags)
-        case = {**_jacobian(phi, "small_angle" if a < 1e-3 else ""), "tolerance": losing(fine, a, 1, COSINE)}
+        case = {
+            **_jacobian(phi, "small_angle" if a < 1e-3 else ""),
+            "tolerance": losing(fine if a < np.pi else squared, a, 1, COSINE),
+        }
         topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", fine, [case], flags=flags)
         near = abs(np.pi - a)
         rule = losing(pole, near, 1, HALF) if near < 0.1 else losing(pole, a, 2, RATIO)
