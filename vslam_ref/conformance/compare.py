@@ -64,7 +64,7 @@ class Difference(NamedTuple):
 RIGHT = Difference("passed", "", None, None, 0.0, 0.0, MOST_DIGITS)
 
 
-class Rule(NamedTuple):
+class Allowed(NamedTuple):
     """A tolerance of one profile, and the wider one within which only digits are lost."""
 
     relative: float
@@ -116,7 +116,7 @@ def compare(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Di
     return best
 
 
-def _nearer_to_a_mistake(case: Case, got: dict[str, Any], found: Difference, rule: Rule) -> bool:
+def _nearer_to_a_mistake(case: Case, got: dict[str, Any], found: Difference, rule: Allowed) -> bool:
     """Whether a known wrong formula explains an answer better than lost digits do."""
     kinds = functions()[case.function].outputs
     strict = rule._replace(lost_relative=-1.0)
@@ -126,14 +126,14 @@ def _nearer_to_a_mistake(case: Case, got: dict[str, Any], found: Difference, rul
 def matches(answer: dict[str, Any], got: dict[str, Any], case: Case, profile: Profile = "float64") -> bool:
     """Whether an answer is that of a wrong formula, within ten times the tolerance."""
     rule = rule_of(case, profile)
-    rule = Rule(10 * rule.relative, 10 * rule.absolute, rule.eps)
+    rule = Allowed(10 * rule.relative, 10 * rule.absolute, rule.eps)
     return _outputs(answer, got, rule, functions()[case.function].outputs).right
 
 
-def rule_of(case: Case, profile: Profile) -> Rule:
+def rule_of(case: Case, profile: Profile) -> Allowed:
     """The tolerance of a case in a profile."""
     given = case.tolerance if profile == "float64" else case.tolerance["float32"]
-    rule = Rule(float(given["relative"]), float(given["absolute"]), EPS[profile])
+    rule = Allowed(float(given["relative"]), float(given["absolute"]), EPS[profile])
     lost = given.get("lost_digits")
     if lost is None:
         return rule
@@ -146,7 +146,7 @@ def is_asked(case: Case, profile: Profile) -> bool:
 
 
 def _outputs(
-    expected: Mapping[str, Any], got: Mapping[str, Any], rule: Rule, kinds: Mapping[str, str]
+    expected: Mapping[str, Any], got: Mapping[str, Any], rule: Allowed, kinds: Mapping[str, str]
 ) -> Difference:
     return _worst(
         _value(name, *_prepared(kinds.get(name, "plain"), value, got[name]), rule)
@@ -206,7 +206,7 @@ def _table(text: str) -> list[list[float]] | str:
         return text
 
 
-def _value(where: str, expected: Any, got: Any, rule: Rule) -> Difference:
+def _value(where: str, expected: Any, got: Any, rule: Allowed) -> Difference:
     """Compare one output; of a list of records (a trace), the first that differs is reported."""
     if isinstance(expected, list) and expected and isinstance(expected[0], dict):
         return _records(where, expected, got, rule)
@@ -222,7 +222,7 @@ def _value(where: str, expected: Any, got: Any, rule: Rule) -> Difference:
     return _arrays(where, want, have, rule)
 
 
-def _records(where: str, expected: list[Any], got: Any, rule: Rule) -> Difference:
+def _records(where: str, expected: list[Any], got: Any, rule: Allowed) -> Difference:
     """Compare the steps of a trace."""
     if not isinstance(got, list) or len(got) != len(expected):
         length = len(got) if isinstance(got, list) else type(got).__name__
@@ -236,7 +236,7 @@ def _records(where: str, expected: list[Any], got: Any, rule: Rule) -> Differenc
     return _worst(found)
 
 
-def _arrays(where: str, want: Array, have: Array, rule: Rule) -> Difference:
+def _arrays(where: str, want: Array, have: Array, rule: Allowed) -> Difference:
     finite = np.isfinite(want)
     same_odd = bool(np.array_equal(want[~finite], have[~finite], equal_nan=True))
     if not same_odd or not np.isfinite(have[finite]).all():

@@ -24,7 +24,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.geometry import so2
 
 
-class Updated(NamedTuple):
+class PolarUpdate(NamedTuple):
     """State and its covariance.
 
     Attributes
@@ -74,7 +74,7 @@ def predicted_polar(x: ArrayLike, slot: int) -> tuple[Array, Array]:
     return np.array([r, float(so2.wrap(np.arctan2(d[1], d[0]) - state[2]))]), H
 
 
-def update_polar(x: ArrayLike, P: ArrayLike, ids: ArrayLike, polar: ArrayLike, cov: ArrayLike) -> Updated:
+def update_polar(x: ArrayLike, P: ArrayLike, ids: ArrayLike, polar: ArrayLike, cov: ArrayLike) -> PolarUpdate:
     """Update a state with ranges and bearings of landmarks of the map, all at once.
 
     Implements :eq:`eq-gain` with range and bearing in the place of relative coordinates.
@@ -92,7 +92,7 @@ def update_polar(x: ArrayLike, P: ArrayLike, ids: ArrayLike, polar: ArrayLike, c
 
     Returns
     -------
-    Updated
+    PolarUpdate
         The heading in (-pi, pi].
 
     Examples
@@ -104,7 +104,7 @@ def update_polar(x: ArrayLike, P: ArrayLike, ids: ArrayLike, polar: ArrayLike, c
     state, P = np.asarray(x, dtype=np.float64), np.asarray(P, dtype=np.float64)
     seen = [predicted_polar(state, int(i)) for i in np.asarray(ids)]
     if not seen:
-        return Updated(state.copy(), P.copy())
+        return PolarUpdate(state.copy(), P.copy())
     H = np.concatenate([slope for _, slope in seen])
     innovation = np.asarray(polar, dtype=np.float64).reshape(-1, 2) - [value for value, _ in seen]
     innovation[:, 1] = so2.wrap(innovation[:, 1])  # a difference of bearings is an angle, too
@@ -112,4 +112,4 @@ def update_polar(x: ArrayLike, P: ArrayLike, ids: ArrayLike, polar: ArrayLike, c
     K = np.linalg.solve(S, H @ P).T
     after, kept = state + K @ innovation.ravel(), P - K @ S @ K.T
     after[2] = so2.wrap(after[2])
-    return Updated(after, (kept + kept.T) / 2)
+    return PolarUpdate(after, (kept + kept.T) / 2)
