@@ -144,6 +144,11 @@ def _loop(node: ast.For) -> Iterator[Change]:
         node.iter.func.id if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) else ""
     )
     target = node.target.elts[0] if isinstance(node.target, ast.Tuple) else node.target
-    if called in ("range", "enumerate") and isinstance(target, ast.Name):
+    if called in ("range", "enumerate") and isinstance(target, ast.Name) and _uses(node.body, target.id):
         least = ast.parse(f"{target.id} = min({target.id}, 1)").body
         yield "from the third on the second block", Carry(node, body=[*least, *node.body])
+
+
+def _uses(body: list[ast.stmt], name: str) -> bool:
+    """Whether a loop looks at its number at all."""
+    return any(isinstance(n, ast.Name) and n.id == name for part in body for n in ast.walk(part))
