@@ -1,6 +1,7 @@
 """Put small mistakes into the library's formulas and count those that the vectors notice (minutes).
 
     python tests/conformance/mutants.py [--sample 200] [--seed 0] [--jobs 2] [--json FILE]
+    python tests/conformance/mutants.py --regimes [--chapter 02 ...]    # branches, series, special values
 
 Status 1 where fewer than 95 % are noticed.  Needs ``os.fork``, which Windows does not have.
 """
@@ -35,11 +36,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", metavar="S", type=int, default=0)
     parser.add_argument("--jobs", metavar="J", type=int, default=2)
     parser.add_argument("--json", metavar="FILE", type=Path)
+    parser.add_argument("--regimes", action="store_true", help="change branches for operators")
+    parser.add_argument("--inside", metavar="M", action="append", default=[], help="only these modules")
+    parser.add_argument("--chapter", metavar="NN", action="append", default=[], help="only this; may repeat")
     options = parser.parse_args(arguments)
     if not hasattr(os, "fork"):
         print("mutants: this system has no os.fork", file=sys.stderr)
         return 2
-    found = study(options.sample, options.seed, options.jobs, show)
+    inside = options.inside or ["vslam_ref"]
+    chapters = [f"{int(c):02d}" for c in options.chapter]
+    found = study(
+        options.sample,
+        options.seed,
+        options.jobs,
+        show,
+        regimes=options.regimes,
+        chapters=chapters,
+        inside=inside,
+    )
     run_by, unseen = len(found.functions), len(found.unseen)
     print(f"functions that cite an equation: {run_by} are run by the vectors, {unseen} are not")
     noticeable = len(found.sample) - found.equivalent

@@ -57,7 +57,7 @@ def fisheye(k: Array, X: Array, wrong: str | None = None) -> Array:
     rho = np.sqrt(X[0] ** 2 + X[1] ** 2)
     if rho == 0:
         return np.zeros(2)
-    theta = np.arctan(rho / X[2])
+    theta = np.arctan(rho / X[2]) if X[2] else np.pi / 2
     if X[2].real < 0 and wrong != "half-space-only":
         theta = theta + np.pi
     return theta * polynomial(k, theta * theta) * X[:2] / rho
@@ -99,7 +99,7 @@ def project(model: str, params: Array, X_cam: Array, wrong: str | None = None) -
 def unproject(model: str, params: Array, uv: Array, wrong: str | None = None) -> Any:
     xd = (uv - params[2:4]) / params[:2]
     size = float(np.hypot(*xd))
-    if wrong == "not-undistorted" or model == "pinhole":
+    if wrong == "not-undistorted" or model == "pinhole" or size == 0:
         ray = np.array([*xd, 1.0])
     elif model == "fov":
         omega = params[4]

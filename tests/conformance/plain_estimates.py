@@ -142,8 +142,37 @@ def lm_trace(
     return steps
 
 
+def nielsen_trace(
+    y: Array, t: Array, start: Array, damping: float, count: int, wrong: str | None = None
+) -> list[dict[str, Any]]:
+    def residual(b: Array) -> Array:
+        return b[0] * np.exp(-b[1] * t) - y
+
+    b, lam, nu, steps = start, damping, 2.0, []
+    for _ in range(int(count)):
+        e = np.exp(-b[1] * t)
+        J, r = np.stack([e, -b[0] * t * e], 1), residual(b)
+        step = np.linalg.lstsq(
+            np.vstack([J, np.sqrt(lam) * np.eye(2)]), -np.concatenate([r, [0, 0]]), rcond=None
+        )[0]
+        share = 0.0 if wrong == "promise-of-gauss-newton" else lam * step @ step
+        new = residual(b + step)
+        gain = (r @ r - new @ new) / 2 / ((J @ step) @ (J @ step) / 2 + share)
+        taken = gain > 0 or wrong == "always-taken"
+        cost = float(new @ new if taken else r @ r) / 2
+        steps.append({"cost": cost, "gain": float(gain), "damping": float(lam), "taken": int(taken)})
+        if taken:
+            power = 2 if wrong == "factor-not-cubed" else 3
+            b, nu, lam = b + step, 2.0, lam * max(1 / 3, 1 - (2 * min(gain, 1.0) - 1) ** power)
+        else:
+            lam, nu = lam * nu, nu if wrong == "growth-not-doubled" else 2 * nu
+    return steps
+
+
 def covariance(J: Array, r: Array, wrong: str | None = None) -> Array:
     m, n = J.shape
+    if m <= n or np.linalg.matrix_rank(J) < n:
+        raise ValueError("no residual is left over")
     noise = {"divided-by-m": r @ r / m, "noise-of-one": 1.0}.get(wrong or "", r @ r / (m - n))
     root = np.linalg.pinv(J)
     C = noise * root @ root.T
@@ -239,6 +268,7 @@ PROGRAM = {
     "least_squares.gauss_newton_step": gauss_newton_step,
     "least_squares.lm_step": lm_step,
     "least_squares.lm_trace": lm_trace,
+    "least_squares.nielsen_trace": nielsen_trace,
     "least_squares.covariance": covariance,
     "least_squares.nielsen_factor": nielsen_factor,
     "bundle.residual": residual,

@@ -100,6 +100,8 @@ def _wrapped(x: Array, wrong: str) -> Array:
 
 def update(x: Any, P: Any, ids: Any, z: Any, cov_z: Any, wrong: str = "") -> Answer:
     x, P, z, cov_z = arrays(x, P, z, cov_z)
+    if not len(ids):
+        return {"x": x, "P": P}
     if wrong == "one-at-a-time" and len(ids) > 1:
         for i, row in zip(ids, z, strict=True):
             x, P = update(x, P, [i], [row], cov_z).values()
@@ -164,6 +166,63 @@ def from_polar(polar: Any, sigma_range: float, sigma_bearing: float, wrong: str 
     R = np.array([[np.cos(b), -np.sin(b)], [np.sin(b), np.cos(b)]])
     z = (1.0 if wrong else grown) * r * R[:, 0]
     return {"z": z, "cov": R @ np.diag([along, across]) @ R.T}
+
+
+def yaw_rate(x: Any, control: Any, dt: float, wrong: str = "") -> Answer:
+    (px, py, th), (v, omega) = x, control
+    if wrong:
+        return velocity_arc(x, control, dt)
+    return {"x": [px + v * dt * np.cos(th), py + v * dt * np.sin(th), wrap(th + omega * dt)]}
+
+
+def velocity_arc(x: Any, control: Any, dt: float, wrong: str = "") -> Answer:
+    (px, py, th), (v, omega) = x, control
+    if wrong:
+        return yaw_rate(x, control, dt)
+    chord, middle = v * dt * np.sinc(omega * dt / 2 / np.pi), th + omega * dt / 2
+    return {"x": [px + chord * np.cos(middle), py + chord * np.sin(middle), wrap(th + omega * dt)]}
+
+
+def predict_additive(
+    x: Any, P: Any, control: Any, cov_pose: Any, wheelbase: float, dt: float, wrong: str = ""
+) -> Answer:
+    found = predict(x, P, control, np.zeros((2, 2)), wheelbase, dt)
+    R = block_diag(turn(x[2]), 1.0) if wrong else np.eye(3)
+    found["P"][:3, :3] += R @ np.array(cov_pose) @ R.T
+    return found
+
+
+def gate(x: Any, P: Any, id: int, z: Any, cov_z: Any, wrong: str = "") -> Answer:
+    x, P, z, cov_z = arrays(x, P, z, cov_z)
+    d, R, at = x[3 + 2 * id : 5 + 2 * id] - x[:2], turn(-x[2]), 3 + 2 * id
+    H = np.zeros((2, len(x)))
+    H[:, :2], H[:, 2], H[:, at : at + 2] = -R, [(R @ d)[1], -(R @ d)[0]], R
+    S = cov_z if wrong == "noise-alone" else H @ P @ H.T + cov_z
+    value = float((z - R @ d) @ np.linalg.inv(S) @ (z - R @ d))
+    return {"value": value**0.5 if wrong == "distance-not-squared" else value}
+
+
+def update_polar(x: Any, P: Any, ids: Any, polar: Any, cov: Any, wrong: str = "") -> Answer:
+    """Jacobians by complex numbers: r e^(ib) is the relative place."""
+    x, P, polar, cov = arrays(x, P, polar, cov)
+    if not len(ids):
+        return {"x": x, "P": P}
+    H, nu = np.zeros((2 * len(ids), len(x))), []
+    for k, (i, (r, b)) in enumerate(zip(map(int, ids), polar, strict=True)):
+        at = 3 + 2 * i
+        w = complex(*(x[at : at + 2] - x[:2]))
+        size = abs(w)
+        H[2 * k, at : at + 2] = w.real / size, w.imag / size
+        H[2 * k + 1, at : at + 2] = -w.imag / size**2, w.real / size**2
+        H[2 * k : 2 * k + 2, :2] = -H[2 * k : 2 * k + 2, at : at + 2]
+        H[2 * k + 1, 2] = -1
+        off = b - wrap(np.angle(w) - x[2])
+        nu += [r - size, off if wrong == "bearing-not-wrapped" else wrap(off)]
+    if wrong == "bearing-sign":
+        H[1::2] *= -1
+    S = H @ P @ H.T + block_diag(*[cov] * len(ids))
+    K = np.linalg.solve(S, H @ P).T
+    return {"x": _wrapped(x + K @ nu, ""), "P": P - K @ S @ K.T}
 
 
 def trace(

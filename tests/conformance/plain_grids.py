@@ -53,6 +53,8 @@ def band(runs: int, dof: int, confidence: float, wrong: str = "") -> Answer:
 
 
 def bound(runs: int, dof: int, confidence: float, wrong: str = "") -> Answer:
+    if runs < 1 or dof < 1 or not 0 < confidence < 1:
+        raise ValueError("no bound")
     n = 1 if wrong == "one-run" else runs
     tail = (1 - confidence) / (2 if wrong == "half-tail" else 1)
     return {"high": chi2.isf(tail, n * dof) / (1 if wrong == "not-divided" else n)}

@@ -58,6 +58,8 @@ def so2_wrap(angle: float, wrong: str | None = None) -> Array:
         return np.mod(angle, 2 * np.pi)
     if wrong == "wrapped-once":
         return angle - 2 * np.pi * np.sign(angle) if abs(angle) > np.pi else angle
+    if wrong == "other-end":
+        return (angle + np.pi) % (2 * np.pi) - np.pi
     if wrong == "wrapped-by-pi":
         return np.mod(angle + np.pi / 2, np.pi) - np.pi / 2
     return angle if abs(angle) < np.pi else np.arctan2(np.sin(angle), np.cos(angle))
@@ -91,7 +93,7 @@ def se2_log(x: Array, wrong: str | None = None) -> Array:
     if wrong == "straight":
         return x
     half = x[2] / 2
-    h = half / np.tan(half)
+    h = half / np.tan(half) if half else 1.0
     return np.array([h * x[0] + half * x[1], -half * x[0] + h * x[1], x[2]])
 
 
@@ -101,6 +103,8 @@ def se2_compose(a: Array, b: Array, wrong: str | None = None) -> Array:
         x[:2] = a[:2] + b[:2]
     if wrong == "not-wrapped":
         x[2] = a[2] + b[2]
+    if wrong == "other-end" and x[2] >= np.pi:
+        x[2] = -np.pi
     return x
 
 
@@ -148,6 +152,8 @@ def so3_interpolate(a: Array, b: Array, fraction: float, wrong: str | None = Non
 
 def so3_nearest(M: Array, wrong: str | None = None) -> Array:
     U, _, Vt = np.linalg.svd(M)
+    if wrong == "mirror":
+        return U @ Vt
     return U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
 
 

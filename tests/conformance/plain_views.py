@@ -214,6 +214,8 @@ def align(source: Array, target: Array, with_scale: bool, wrong: str | None = No
         return align(target, source, with_scale)
     a, b = source.mean(0), target.mean(0)
     p, q = source - a, target - b
+    if min(np.linalg.matrix_rank(p, 1e-9), np.linalg.matrix_rank(q, 1e-9)) < 2:
+        raise ValueError("the points leave the rotation open")
     U, D, Vt = np.linalg.svd(q.T @ p)
     sign = np.array([1, 1, 1.0 if wrong == "mirrored" else np.linalg.det(U @ Vt)])
     R = U @ np.diag(sign) @ Vt

@@ -24,7 +24,7 @@ AT_LEAST_EIGHT = ("opencv", "scipy", "gtsam", "cpp", "node")
 def judge(name: str, report: Report) -> None:
     """Compare a run with the adapter's list."""
     listed = lists.listed(name)
-    bad = {o.case.id: o for o in report.outcomes if o.status in ("failed", "error")}
+    bad = {o.case.id: o for o in report.outcomes if lists.is_wrong(o)}
     rounding = {k: o for k, o in bad.items() if lists.regime(k) in listed.within}
     asked = {o.case.id for o in report.outcomes if o.status != "unsupported"}
     told = {k: f"{o.status} {o.difference} {o.cause}" for k, o in bad.items() if k not in rounding}

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from mutation.regimes import regime_mutants, with_regime
 from mutation.sites import mutants, mutated
 
 SOURCE = '''
@@ -66,6 +67,43 @@ def test_words_say_what_is_done() -> None:
     assert "return +c + M" in by_text["f", "a minus sign left out"]
     assert "np.cross(b, a)" in by_text["C.g", "factors of a cross product exchanged"]
     assert "a -= b" in by_text["C.g", "the sign of an addition in place"]
+
+
+REGIMES = """
+import numpy as np
+
+def f(a, q, n):
+    if a < 0:
+        raise ValueError("negative")
+    if a < 1e-4:
+        return 1.0 - q / 6 + q * q / 120
+    b = np.where(q > 0.0, q, 1.0)
+    c = np.clip(b, -1, 1)
+    for k in range(n):
+        c = c + k
+    return np.polyval((0.5, -0.25, 0.125), c)
+"""
+WANTED_REGIMES = [
+    "a branch always taken", "a branch never taken", "a series shortened", "a sum's last term left out",
+    "a threshold 100 times larger", "a threshold 100 times smaller", "clip left out",
+    "from the third on the second block", "one side for both, the first", "one side for both, the second",
+    *["the limit itself on the other side"] * 2,
+]  # fmt: skip
+
+
+def test_regimes_are_changed_one_at_a_time_and_checks_are_not() -> None:
+    found = regime_mutants("m", REGIMES)
+    assert sorted(m.text for m in found) == sorted([*WANTED_REGIMES])
+    texts = {m.text: with_regime(REGIMES, m.number) for m in found}
+    assert "if True:\n        return 1.0" in texts["a branch always taken"]
+    assert "np.where(q > 0.0, 1.0, 1.0)" in texts["one side for both, the second"]
+    assert "1.0 - q / 6 + 0.0" in texts["a sum's last term left out"]
+    assert "(0.5, -0.25, 0.0)" in texts["a series shortened"]
+    assert "c = _same(b)" in texts["clip left out"]
+    assert "k = min(k, 1)" in texts["from the third on the second block"]
+    assert "a < 0.0001 * 100.0" in texts["a threshold 100 times larger"]
+    for text in texts.values():
+        ast.parse(text)
 
 
 STUDY = """

@@ -20,6 +20,7 @@ WORDS = {
     "string": "text",
     "number": "number",
     "integer": "whole number",
+    "boolean": "truth value",
     "object": "object",
     "array": "list",
 }

@@ -24,6 +24,11 @@ PAGES = Path(__file__).resolve().parents[2] / "docs" / "chapters"
 PROGRAM = {
     "vehicle.ackermann": ekf.ackermann,
     "vehicle.front_wheel": ekf.front_wheel,
+    "vehicle.yaw_rate": ekf.yaw_rate,
+    "vehicle.velocity_arc": ekf.velocity_arc,
+    "ekf.predict_additive": ekf.predict_additive,
+    "ekf.gate": ekf.gate,
+    "range_bearing.update": ekf.update_polar,
     "ekf.predict": ekf.predict,
     "ekf.update": ekf.update,
     "ekf.augment": ekf.augment,
@@ -63,6 +68,7 @@ PROGRAM = {
 }
 FILES = [
     "15/ekf.json",
+    "15/range_bearing.json",
     "15/vehicle.json",
     "16/carleman.json",
     "16/lift.json",

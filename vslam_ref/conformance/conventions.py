@@ -20,6 +20,10 @@ T_world_cam         left          (Exp(eta) T^-1)^-1         -Ad_T eta
 
 With xi = M eta, a Jacobian is J_program = J M, and a covariance M P_program M^T = P
 (:eq:`eq-convention-tangent` and the two after it, chapter 24).  An information H becomes M^T H M.
+
+
+What else may be declared stands in :data:`DECLARABLE`, a line each; how a quantity changes, in
+:mod:`.conversions`.
 """
 
 from __future__ import annotations
@@ -28,27 +32,23 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-import numpy as np
-
-from vslam_ref.arrays import Array
+from vslam_ref.conformance import conversions
 from vslam_ref.conformance.catalogue import Function
-from vslam_ref.conformance.compare import numbers
-from vslam_ref.geometry import se3
+from vslam_ref.conformance.conversions import ROTATION_FIRST, ROTATION_FIRST_SIM3
 
-CHANGED_BY = {
-    "pose": "transform",
-    "poses": "transform",
-    "quaternion": "quaternion_order",
-    "pixel": "pixel_origin",
-    "intrinsics": "pixel_origin",
-    "residual": "residual",
-}
-"""Kind of quantity -> the choice that changes it; tangents are changed by their order."""
-ON_POSES = ("pose_jacobian", "pose_covariance", "pose_information")
-ROTATION_FIRST = [3, 4, 5, 0, 1, 2]
-ROTATION_FIRST_SIM3 = [3, 4, 5, 0, 1, 2, 6]
+__all__ = [
+    "DECLARABLE",
+    "ROTATION_FIRST",
+    "ROTATION_FIRST_SIM3",
+    "Convention",
+    "Declarable",
+    "read",
+]
+
+JACOBIANS = tuple(f"{group}.left_jacobian" for group in ("so3", "se3", "se2", "sim3"))
+"""Of the groups; their inverses have the same names with _inverse."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,29 @@ class Convention:
     perturbation : {"left", "right"}
         On which side of its pose a program perturbs.
     tangent_order : {"translation_first", "rotation_first"}
+        Of SE(3) and Sim(3).
     quaternion_order : {"wxyz", "xyzw"}
     pixel_origin : {"centre", "corner"}
         Whether (0, 0) is the centre or the outer corner of the top-left pixel.
     residual : {"predicted_minus_measured", "measured_minus_predicted"}
+    angle_range : {"(-pi, pi]", "[-pi, pi)", "[0, 2pi)"}
+        Where angles and headings lie.
+    rotation_angle : {"[0, pi]", "[0, 2pi)"}
+        Length of the logarithm of a rotation.
+    group_jacobian : {"left", "right"}
+        Which Jacobian of a group a program has.
+    vectors : {"columns", "rows"}
+        Rows: x' = x M, and all matrices of motions are transposed.
+    pose_step : {"screw", "split"}
+        Split: rotation and translation of a pose step apart, SO(3) x R^3.
+    essential : {"of_the_translation", "unit_translation", "unit_norm"}
+        Size of an essential matrix.
+    quaternion_product : {"hamilton", "jpl"}
+        JPL: the quaternion of a rotation matrix is the conjugate of Hamilton's.
+    se2_order : {"translation_first", "angle_first"}
+        Of the tangent vectors of SE(2).
+    sim3_scale : {"last", "first"}
+        Where the logarithm of the scale stands in a tangent vector of Sim(3).
     """
 
     transform: Literal["cam_from_world", "world_from_cam"] = "cam_from_world"
@@ -74,10 +93,22 @@ class Convention:
     quaternion_order: Literal["wxyz", "xyzw"] = "wxyz"
     pixel_origin: Literal["centre", "corner"] = "centre"
     residual: Literal["predicted_minus_measured", "measured_minus_predicted"] = "predicted_minus_measured"
+    angle_range: Literal["(-pi, pi]", "[-pi, pi)", "[0, 2pi)"] = "(-pi, pi]"
+    rotation_angle: Literal["[0, pi]", "[0, 2pi)"] = "[0, pi]"
+    group_jacobian: Literal["left", "right"] = "left"
+    vectors: Literal["columns", "rows"] = "columns"
+    pose_step: Literal["screw", "split"] = "screw"
+    essential: Literal["of_the_translation", "unit_translation", "unit_norm"] = "of_the_translation"
+    quaternion_product: Literal["hamilton", "jpl"] = "hamilton"
+    se2_order: Literal["translation_first", "angle_first"] = "translation_first"
+    sim3_scale: Literal["last", "first"] = "last"
 
     def inputs(self, function: Function, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Inputs in the program's form."""
-        return {name: self.converted(kind, inputs[name], inputs) for name, kind in function.inputs.items()}
+        given = {name: inputs[name] for name in function.inputs}
+        if self.group_jacobian == "right" and function.name.removesuffix("_inverse") in JACOBIANS:
+            given = {name: conversions.negative(value) for name, value in given.items()}  # J_r(-x) = J_l(x)
+        return {name: self.converted(kind, given[name], inputs) for name, kind in function.inputs.items()}
 
     def outputs(
         self, function: Function, outputs: Mapping[str, Any], inputs: Mapping[str, Any]
@@ -88,61 +119,49 @@ class Convention:
 
     def converted(self, kind: str, value: Any, inputs: Mapping[str, Any], *, home: bool = False) -> Any:
         """One quantity, from the house's form to the program's, or back ``home``."""
-        about = "tangent_order" if kind.startswith("tangent") else CHANGED_BY.get(kind)
-        on_pose = kind in ON_POSES
-        if not on_pose and (about is None or getattr(self, about) == getattr(Convention, about)):
-            return value
-        x, order = numbers(value), np.array(self._order(kind))
-        order, half = (np.argsort(order), -0.5) if home else (order, 0.5)
-        if on_pose:
-            return self._on_pose(kind, x, inputs, home).tolist()
-        if about == "transform":
-            return se3.inverse(x).tolist()
-        if about == "quaternion_order":
-            return x[..., [3, 0, 1, 2] if home else [1, 2, 3, 0]].tolist()
-        if about == "pixel_origin":
-            return (x + half * (_centre(x) if kind == "intrinsics" else 1.0)).tolist()
-        if about == "residual":
-            return (-x).tolist()
-        turned = x[..., order, :] if kind.startswith("tangent_matrix") else x
-        return turned[..., order].tolist()
+        return conversions.converted(self, kind, value, inputs, home)
 
-    def _on_pose(self, kind: str, x: Array, inputs: Mapping[str, Any], home: bool) -> Array:
-        """Jacobian, covariance or information of a pose's tangent vector.
-
-        Implements :eq:`eq-convention-jacobian` and :eq:`eq-convention-covariance`.
-        """
-        M = self._from_program(inputs)[:, self._order(kind)]  # xi = M eta, eta in the program's order
-        M = np.asarray(np.linalg.inv(M)) if home else M
-        if kind == "pose_jacobian":
-            return np.asarray(x @ M)
-        if kind == "pose_information":
-            return np.asarray(np.swapaxes(M, -1, -2) @ x @ M)
-        back = np.linalg.inv(M)
-        return np.asarray(back @ x @ np.swapaxes(back, -1, -2))
-
-    def _order(self, kind: str) -> list[int]:
-        """Where the program's coordinates stand in the house's."""
-        if self.tangent_order == "translation_first":
-            return list(range(7 if kind.endswith("sim3") else 6))
-        return ROTATION_FIRST_SIM3 if kind.endswith("sim3") else ROTATION_FIRST
-
-    def _from_program(self, inputs: Mapping[str, Any]) -> Array:
-        """M with xi = M eta, translations first in both.
-
-        Implements :eq:`eq-convention-tangent`.
-        """
-        away = self.transform == "world_from_cam"
-        turned = (self.perturbation == "right") != away
-        M = se3.adjoint(numbers(inputs["pose"])) if turned else np.eye(6)
-        return -M if away else M
+    def differs(self, *names: str) -> bool:
+        """Whether one of these choices is not the house's."""
+        return any(getattr(self, name) != getattr(Convention, name) for name in names)
 
 
-def _centre(params: Array) -> Array:
-    """Ones at cx and cy."""
-    ones = np.zeros(params.shape)
-    ones[..., 2:4] = 1.0
-    return ones
+class Declarable(NamedTuple):
+    """A choice that a program may declare.
+
+    Attributes
+    ----------
+    name, value : str
+        As in the JSON file.
+    changes : str
+        What it means.
+    """
+
+    name: str
+    value: str
+    changes: str
+
+
+DECLARABLE = (
+    Declarable("transform", "world_from_cam", "poses map the camera's coordinates to the world's"),
+    Declarable("perturbation", "right", "poses are perturbed on the right, T Exp(eta)"),
+    Declarable("tangent_order", "rotation_first", "rotation stands before translation"),
+    Declarable("quaternion_order", "xyzw", "w stands last"),
+    Declarable("pixel_origin", "corner", "(0, 0) is the corner of the top-left pixel"),
+    Declarable("residual", "measured_minus_predicted", "residuals have the other sign"),
+    Declarable("angle_range", "[0, 2pi)", "angles and headings lie in [0, 2 pi)"),
+    Declarable("angle_range", "[-pi, pi)", "half a turn is -pi"),
+    Declarable("rotation_angle", "[0, 2pi)", "rotation vectors are up to a whole turn long"),
+    Declarable("group_jacobian", "right", "Jacobians of groups are the right ones, J(-xi)"),
+    Declarable("vectors", "rows", "vectors are rows: matrices of motions are transposed"),
+    Declarable("pose_step", "split", "rotation and translation of a pose step apart, SO(3) x R^3"),
+    Declarable("essential", "unit_translation", "essential matrices are those of a unit translation"),
+    Declarable("essential", "unit_norm", "essential matrices have norm 1"),
+    Declarable("quaternion_product", "jpl", "quaternions are JPL's: the conjugates of Hamilton's"),
+    Declarable("se2_order", "angle_first", "the angle stands before the translation in SE(2)"),
+    Declarable("sim3_scale", "first", "the scale stands first in Sim(3)"),
+)
+"""Every choice that is not the house's, with what it changes."""
 
 
 def read(path: Path) -> Convention:

@@ -12,6 +12,11 @@ import pkgutil
 from types import ModuleType
 
 HELPERS = (
+    "angles",
+    "ekf_others",
+    "ekf_sizes",
+    "lens_grid",
+    "solver_runs",
     "exact",
     "building",
     "curve_matches",

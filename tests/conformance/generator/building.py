@@ -13,19 +13,28 @@ import numpy as np
 from vslam_ref.conformance.vectors_format import CONVENTION
 
 VERSION = "0.1.0"
-CHANGED = dict.fromkeys(
-    (
-        *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss", "least_squares"),
-        *("bundle", "format", "trajectory"),
+CHANGED = {
+    **dict.fromkeys(("format", "trajectory"), "0.1.1"),  # random inputs of 12 digits
+    **dict.fromkeys(
+        (
+            *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss"),
+            *("least_squares", "bundle", "vehicle", "ekf", "range_bearing", "consistency", "grid"),
+        ),
+        "0.2.0",  # regimes filled: every size, special values, sizes of maps; digits that may be lost
     ),
-    "0.1.1",  # random inputs of 12 digits
-)
+}
 """Topic -> its version, where its numbers have changed since VERSION."""
 FORMAT = 1
 
 
 def tolerance(
-    relative: float, reason: str, *, absolute: float = 0.0, float32: float | None = None
+    relative: float,
+    reason: str,
+    *,
+    absolute: float = 0.0,
+    float32: float | None = None,
+    lost: dict[str, Any] | None = None,
+    lost32: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Tolerance of a group.
 
@@ -40,13 +49,28 @@ def tolerance(
     float32 : float, optional
         The relative one in single precision; by default 2^29 times the double one, the ratio of the epsilons,
         at most 0.01.
+    lost, lost32 : dict, optional
+        Of :func:`lost_digits`, in double and in single precision.
     """
     ratio = 2.0**29
-    single = {
+    single: dict[str, Any] = {
         "relative": min(0.01, relative * ratio) if float32 is None else float32,
         "absolute": absolute * ratio,
     }
-    return {"relative": relative, "absolute": absolute, "reason": reason, "float32": single}
+    if lost32 is not None:
+        single["lost_digits"] = lost32
+    rule = {"relative": relative, "absolute": absolute, "reason": reason}
+    return {**rule, **({} if lost is None else {"lost_digits": lost}), "float32": single}
+
+
+def lost_digits(relative: float, reason: str, *, absolute: float = 0.0) -> dict[str, Any]:
+    """Width within which digits are lost and nothing is wrong: what the formula in the reason loses."""
+    return {"relative": relative, "absolute": absolute, "reason": reason}
+
+
+def not_in_single(rule: dict[str, Any]) -> dict[str, Any]:
+    """Tolerance of cases whose inputs single precision cannot hold: they are not asked there."""
+    return {**rule, "float32": {**rule["float32"], "asked": False}}
 
 
 @dataclass
@@ -97,6 +121,7 @@ class Topic:
         stem = f"{function}/{regime}"
         taken = sum(len(g["cases"]) for g in self.groups if g["stem"] == stem)
         rows = [{"id": f"{stem}-{taken + k:02d}", **case} for k, case in enumerate(cases, 1)]
+        rows = [{k: v for k, v in row.items() if k != "tolerance" or v != tolerance} for row in rows]
         group = {
             "stem": stem,
             "function": function,
@@ -108,7 +133,12 @@ class Topic:
         }
         if statistic is not None:
             group["statistic"] = statistic
-        self.groups.append(group)
+        head = {key: value for key, value in group.items() if key != "cases"}
+        same = [g for g in self.groups if {key: v for key, v in g.items() if key != "cases"} == head]
+        if same:
+            same[0]["cases"] += rows
+        else:
+            self.groups.append(group)
 
     def text(self) -> str:
         """The file, one case a line."""

@@ -8,7 +8,8 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator.building import Topic, tolerance
+from generator.building import Topic, not_in_single, tolerance
+from generator.draws import digits
 from generator.exact import column, floats, matrix, vector
 from generator.groups import motion
 from generator.lenses import LENSES, camera, project, ray
@@ -73,6 +74,7 @@ def build(rng: np.random.Generator) -> Topic:
         flags = () if flag == "generic" else (flag,)
         reason = f"condition of C, at most {condition:g}, times eps and some ten operations"
         rule = tolerance(1e-14 * condition * 5, reason, float32=1e-2)
+        rule = not_in_single(rule) if condition > 1e5 else rule
         some = [_blocks(rng, condition, views) for views in (1, 1, 1, 1, 1, 1, 2, 2)]
         oracle = "block elimination in 50 digits"
         topic.group("bundle.schur", "eq-schur", oracle, rule, [_schur(*s) for s in some], flags=flags)
@@ -89,7 +91,23 @@ def build(rng: np.random.Generator) -> Topic:
     for model in ("pinhole", "radtan", "fisheye", "fov"):
         cases = [case for name, case in blocks if name == model]
         topic.group("bundle.normal_equations", "eq-ba-blocks", oracle, rule, cases, flags=(model,))
+    _sizes(topic, rng)
     return topic
+
+
+def _sizes(topic: Topic, rng: np.random.Generator) -> None:
+    """Views and points in every number: what is right in the first two blocks only is found out."""
+    reason = "condition of C, at most 10, times eps and some ten operations for each point"
+    rule, oracle = tolerance(2e-12, reason, float32=1e-2), "block elimination in 50 digits"
+    for views, points in ((1, 1), (1, 3), (2, 5), (3, 1), (3, 3), (4, 2)):
+        blocks = [digits(v) for v in _blocks(rng, 10.0, views, points)]
+        schur, back = _schur(*blocks), _back(rng, *blocks)
+        for name, equation, case in (
+            ("schur", "eq-schur", schur),
+            ("back_substitute", "eq-back-substitution", back),
+        ):
+            del case["mistakes"]
+            topic.group(f"bundle.{name}", equation, oracle, rule, [case], flags=("any_size",))
 
 
 def _seen(model: str, k: list[Any], T: Any, X: Any) -> list[Any]:
@@ -156,9 +174,9 @@ def _positive(rng: np.random.Generator, n: int, condition: float) -> Array:
     return np.asarray(0.5 * (M + M.T))
 
 
-def _blocks(rng: np.random.Generator, condition: float, views: int) -> tuple[Array, ...]:
-    """B, W, C, g_view, g_point of two points; C is a little stiffer than what W takes off B."""
-    points, D = 2, 6 * views
+def _blocks(rng: np.random.Generator, condition: float, views: int, points: int = 2) -> tuple[Array, ...]:
+    """B, W, C, g_view, g_point; C is a little stiffer than what W takes off B."""
+    D = 6 * views
     B = np.zeros((D, D))
     for v in range(views):
         B[6 * v : 6 * v + 6, 6 * v : 6 * v + 6] = _positive(rng, 6, 5.0) + 10.0 * np.eye(6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import mpmath
@@ -10,6 +11,7 @@ from mpmath import mpf
 
 from generator.building import Topic, tolerance
 from generator.exact import floats, vector
+from generator.lens_grid import every_omega, every_radius, stopping
 from generator.lens_slopes import SLOPES, in_intrinsics, in_pixel, in_point, jacobians
 from generator.lenses import (
     EQUATIONS,
@@ -91,7 +93,30 @@ def build(rng: np.random.Generator) -> Topic:
     _zero_omega(topic, rng)
     for model in LENSES:
         in_pixel(topic, rng, model)
+    fine, newton = _fine(), "Newton's iteration on the definition, 50 digits"
+    for model in LENSES:
+        rule = stopping(_inverse_rule(), model)
+        made = SimpleNamespace(
+            pixel=_pixel, bearing=_bearing, definition=DEFINITION, newton=newton, fine=fine
+        )
+        every_radius(topic, rng, model, SimpleNamespace(**vars(made), rule=rule, inverse=_inverse_of(model)))
+    every_omega(topic, rng, made)
+    cases = [
+        _pixel("fisheye", _mild(rng), X) for X in (np.array([2.0, -1.0, 0.0]), np.array([0.0, 3.0, 0.0]))
+    ]
+    cases = [{key: value for key, value in case.items() if key != "mistakes"} for case in cases]
+    topic.group("camera.project", EQUATIONS["fisheye"], DEFINITION, fine, cases, flags=("fisheye", "at_90"))
+    slopes = tolerance(1e-13, "closed forms of some fifty operations", float32=1e-4)
+    cases = [in_point("fisheye", _mild(rng), ray(rng, 1.0, 5.0) * [1, 1, -1]) for _ in range(3)]
+    cases = [{key: value for key, value in case.items() if key != "mistakes"} for case in cases]
+    flags = ("fisheye", "beyond_90")
+    topic.group("camera.jacobian_point", "eq-jacobian-point", SLOPES, slopes, cases, flags=flags)
     return topic
+
+
+def _inverse_rule() -> dict[str, Any]:
+    reason = "two dozen operations, or Newton's iteration to the end, times the lens's condition, below 30"
+    return tolerance(1e-14, reason)
 
 
 def _fine() -> dict[str, Any]:
@@ -148,7 +173,7 @@ def _closed(rng: np.random.Generator, model: str) -> Array:
 def _pixel(model: str, params: Array, X: Array) -> dict[str, Any]:
     k, x = vector(params), vector(X)
     right = project(model, k, x)
-    r = float(np.hypot(X[0], X[1]) / abs(X[2]))
+    r = float(np.hypot(X[0], X[1]) / abs(X[2])) if X[2] else np.inf
     wrong: dict[str, Any] = {"ptam-half-pixel": [v - mpf(0.5) for v in right]} if model == "fov" else {}
     if model == "fov" and r < 1e-3:
         wrong["ptam-factor-one"] = project(model, k, x, lens=pinhole)
@@ -201,8 +226,7 @@ def _no_pixel(model: str, params: Array, X: Array) -> dict[str, Any]:
 
 
 def _unproject(topic: Topic, rng: np.random.Generator, model: str) -> None:
-    reason = "two dozen operations, or Newton's iteration to the end, times the lens's condition, below 30"
-    rule = tolerance(1e-14, reason)
+    rule = stopping(_inverse_rule(), model)
     far = {"pinhole": (1.0, 5.0), "fov": (1.0, 5.0), "radtan": (0.65, 0.85), "rational": (0.65, 0.85)}
     for flag, (low, high, count) in {
         "near_axis": (1e-9, 9e-4, 4),

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator import exact_ekf
+from generator import ekf_others, ekf_sizes, exact_ekf
 from generator.building import Topic, tolerance
 from generator.exact_arrays import Big, big, doubles, stack
 from generator.exact_ekf import ideal_run
@@ -20,6 +20,8 @@ TOPIC, CHAPTER = "ekf", 15
 DEFINITION = "definition in 50 digits, Jacobians by difference quotients"
 PREDICTED = "sums of 7 x 7 products at most, each rounded by eps: 49 eps = 1.1e-14"
 UPDATED = "sums of 9 x 9 products behind an inverse of S of condition below 120: 9720 eps = 2.2e-12"
+BIG_MAP = "sums of 17 x 17 products at most, each rounded by eps: 289 eps = 6.4e-14"
+BIG_UPDATE = "sums of 17 x 17 products behind an inverse of S of condition below 300: 87000 eps = 2e-11"
 
 NOTES = {
     "gtpg": ("your predict computes G^T P G", "P <- F^T P F + G cov_u G^T"),
@@ -84,6 +86,9 @@ NOTES = {
         "you convert range and bearing without the correction of bias; its covariance is that of first order",
         "z = r (cos b, sin b), cov = R diag(sigma_range^2, r^2 sigma_bearing^2) R^T",
     ),
+    "pose-noise-turned": ("you turn the pose's noise by the heading; it is given in the world", "R Q R^T"),
+    "noise-alone": ("your distance leaves out the state's covariance", "e^T cov_z^-1 e"),
+    "distance-not-squared": ("your distance is the root of what was asked for", "(e^T S^-1 e)^(1/2)"),
     "process-noise-as-sensor-noise": (
         "your update uses the control's covariance where the sensor's belongs",
         "S = H P H^T + cov_u",
@@ -99,6 +104,11 @@ def build(rng: np.random.Generator) -> Topic:
     _new_landmarks(topic, rng)
     _polar(topic, rng)
     _traces(topic, rng)
+    ekf_sizes.predictions(topic, rng, tolerance(6e-14, BIG_MAP))
+    ekf_sizes.updates(topic, rng, tolerance(2e-11, BIG_UPDATE))
+    ekf_sizes.new_landmarks(topic, rng, tolerance(6e-14, BIG_MAP))
+    ekf_others.additive(topic, rng)
+    ekf_others.gates(topic, rng)
     return topic
 
 

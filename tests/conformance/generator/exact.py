@@ -49,13 +49,21 @@ def hat(phi: Sequence[Any]) -> Matrix:
 
 
 def expm(M: Matrix) -> Matrix:
-    """Exponential of a matrix, by its power series; more digits inside."""
-    with mp.workdps(DIGITS + 20):
+    """Exponential of a matrix, by its power series; more digits inside.
+
+    A large matrix is halved until it is small, and its exponential squared as often: the terms of the series
+    would grow to e^|M| before they fall.
+    """
+    halvings = max(0, int(mpmath.log(mpmath.mnorm(M, 1) / 16 + 1, 2)))
+    with mp.workdps(DIGITS + 20 + halvings):
+        part = M / 2**halvings if halvings else M
         total, term, k = mpmath.eye(M.rows), mpmath.eye(M.rows), 0
-        while k < 10 or mpmath.mnorm(term, 1) > mpf(10) ** (-DIGITS - 10):
+        while k < 10 or mpmath.mnorm(term, 1) > mpf(10) ** (-DIGITS - 10 - halvings):
             k += 1
-            term = term * M / k
+            term = term * part / k
             total = total + term
+        for _ in range(halvings):
+            total = total * total
         return +total
 
 

@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
+from generator import solver_runs
 from generator.building import Topic, tolerance
 from generator.draws import log_uniform
 from generator.exact import column, floats, matrix, vector
@@ -25,6 +26,15 @@ NOTES = {
     "damping-squared": ("you square the damping", "J^T J + lambda^2 diag(scale)^2"),
     "marquardt-diagonal": ("you damp with the diagonal of J^T J", "J^T J + lambda diag(J^T J)"),
     "not-damped": ("your step is not damped", "J^T J step = -J^T r"),
+    "promise-of-gauss-newton": (
+        "your gain leaves the damping out of what the model promised",
+        "promised = |J step|^2/2 for |J step|^2/2 + lambda |step|^2",
+    ),
+    "growth-not-doubled": (
+        "your damping doubles after each refused step; it must grow by 2, 4, 8 in a row",
+        "lambda <- 2 lambda",
+    ),
+    "factor-not-cubed": ("you square where Nielsen takes the cube", "max(1/3, 1 - (2 gain - 1)^2)"),
     "always-taken": ("you take a step although the cost rises", "b <- b + step, always"),
     "cost-not-halved": ("your cost is |r|^2; it is half of it", "|r|^2"),
     "divided-by-m": ("you divide by the number of residuals; m - n is wanted", "|r|^2/m (J^T J)^-1"),
@@ -85,6 +95,14 @@ def build(rng: np.random.Generator) -> Topic:
     ]
     simple = tolerance(2e-15, "four operations")
     topic.group("least_squares.nielsen_factor", "eq-nielsen", "definition, 50 digits", simple, cases)
+    made = {"system": _system, "step": _gauss_newton, "damped": _damped, "covariance": _covariance}
+    solver_runs.sizes(topic, rng, made, NORMAL)
+    solver_runs.nielsen_runs(topic, rng)
+    ends = [_nielsen(g) for g in (1e-9, 0.25, 0.75, 0.9367, 0.9369, 0.99, 5.0, 1e6)]
+    ends = [{key: value for key, value in case.items() if key != "mistakes"} for case in ends]
+    topic.group(
+        "least_squares.nielsen_factor", "eq-nielsen", "definition, 50 digits", simple, ends, flags=("ends",)
+    )
     return topic
 
 

@@ -74,23 +74,25 @@ def in_pixel(topic: Topic, rng: np.random.Generator, model: str) -> None:
     """Jacobian of the bearing in the pixel: differences of Newton's solutions."""
     reason = "the inverse of a Jacobian of condition below 30, times some fifty operations"
     rule = tolerance(1e-13, reason, float32=1e-3)
-    cases = []
-    for _ in range(4):
-        params, X = camera(rng, model), ray(rng, 0.05, 0.6)
-        k = vector(params)
-        uv = np.array(floats(project(model, k, vector(X))))
-
-        def plane(at: Any, model: str = model, k: Any = k, X: Any = X) -> list[Any]:
-            b = unproject(model, k, at, X)
-            return [b[0] / b[2], b[1] / b[2], mpf(1)]
-
-        u = vector(uv)
-        J = derivative(lambda at, k=k, X=X: unproject(model, k, at, X), u)
-        wrong = {"ray-not-unit": derivative(plane, u)}
-        if model != "pinhole":
-            wrong["ideal-ray"] = derivative(lambda at, k=k, X=X: unproject("pinhole", k[:4], at, X), u)
-        cases.append(_matrix({"model": model, "params": params, "uv": uv}, J, wrong))
+    cases = [in_pixel_case(model, camera(rng, model), ray(rng, 0.05, 0.6)) for _ in range(4)]
     topic.group("camera.jacobian_ray", "eq-jacobian-ray", SLOPES, rule, cases, flags=(model,))
+
+
+def in_pixel_case(model: str, params: Array, X: Array) -> dict[str, Any]:
+    """Jacobian of the bearing in the pixel of a point."""
+    k = vector(params)
+    uv = np.array(floats(project(model, k, vector(X))))
+    u = vector(uv)
+
+    def plane(at: Any) -> list[Any]:
+        b = unproject(model, k, at, X)
+        return [b[0] / b[2], b[1] / b[2], mpf(1)]
+
+    J = derivative(lambda at: unproject(model, k, at, X), u)
+    wrong = {"ray-not-unit": derivative(plane, u)}
+    if model != "pinhole":
+        wrong["ideal-ray"] = derivative(lambda at: unproject("pinhole", k[:4], at, X), u)
+    return _matrix({"model": model, "params": params, "uv": uv}, J, wrong)
 
 
 def in_intrinsics(model: str, params: Array, X: Array) -> dict[str, Any]:
@@ -141,8 +143,5 @@ def _beside(a: Any, b: Any) -> Any:
 
 
 def _matrix(inputs: dict[str, Any], J: Any, wrong: dict[str, Any]) -> dict[str, Any]:
-    """Jacobian in the intrinsics."""
-    """Jacobian in the point."""
-    """All four Jacobians of a model."""
     mistakes = {note: {"J": floats(M)} for note, M in wrong.items()}
     return {"inputs": inputs, "expected": {"J": floats(J)}, "mistakes": mistakes}

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator.building import Topic, tolerance
+from generator.building import Topic, lost_digits, tolerance
 from generator.draws import digits
 from generator.exact import floats, vector
 from vslam_ref.arrays import Array
@@ -107,6 +107,11 @@ def _group(topic: Topic, name: str, flags: tuple[str, ...], some: list[tuple[flo
     if "tiny" in flags:
         reason = "x^2/2 times a factor near 1, which a formula with differences from 1 would lose"
         rule = tolerance(1e-14, reason, float32=1e-5)
+        if name in ("cauchy", "tukey", "geman-mcclure"):
+            # a minimiser compares costs of the size c^2, c up to 6: there nothing is lost
+            why = "1 - (1 - u^2)^3, log(1 + u^2): a difference from 1 keeps eps of c^2, c at most 6"
+            rule["lost_digits"] = lost_digits(1e-14, why, absolute=2e-14)
+            rule["float32"]["lost_digits"] = lost_digits(1e-5, why, absolute=1e-5)
     for what in ("cost", "influence", "weight"):
         cases = [_case(what, name, c, x) for c, x in some]
         oracle = "definition, 50 digits" if what == "cost" else "derivative of the cost, 50 digits"

@@ -10,6 +10,7 @@ from mpmath import mpf
 
 from generator import similarity
 from generator.building import Topic, tolerance
+from generator.draws import digits
 from generator.exact import column, floats, hat, matrix, vector
 from generator.groups import motion, turned
 from generator.pairs import pair_groups
@@ -122,7 +123,34 @@ def build(rng: np.random.Generator) -> Topic:
         cases = [_alignment_error(rng, with_scale) for _ in range(6)]
         mode = "sim3" if with_scale else "se3"
         topic.group("multiview.alignment_error", "eq-umeyama", oracle, rule, cases, flags=(mode,))
+    _sizes(topic, rng, rule, oracle)
     return topic
+
+
+def _sizes(topic: Topic, rng: np.random.Generator, rule: dict[str, Any], oracle: str) -> None:
+    """Three views and more; three pairs of points and many, and those on one line."""
+    for views in (2, 3, 4, 8):
+        cases = [_bare(_point(rng, views, 1.0)) for _ in range(3)]
+        own = tolerance(1e-12, "a parallax above 0.1: eps over its square, times the depth", float32=1e-2)
+        where = "the scene's own point, projected in 50 digits"
+        topic.group(
+            "multiview.triangulate", "eq-triangulation-linear", where, own, cases, flags=("any_size",)
+        )
+    for with_scale in (True, False):
+        mode = "sim3" if with_scale else "se3"
+        cases = [_bare(_umeyama(rng, "noisy", with_scale, n)) for n in (3, 3, 20)]
+        topic.group("multiview.umeyama", "eq-umeyama", oracle, rule, cases, flags=("any_size", mode))
+    line = digits(np.outer([0.0, 1.0, 2.5, 4.0], [1.0, 2.0, -1.0]) + [0.5, 0.0, 3.0])
+    bad = [(line, line + 1.0), (line[:2], line[:2] + 1.0), (np.ones((4, 3)), line)]
+    cases = [
+        {"inputs": {"source": a, "target": b, "with_scale": True}, "expected": {}, "result": "invalid"}
+        for a, b in bad
+    ]
+    topic.group("multiview.umeyama", "eq-umeyama", "definition", rule, cases, flags=("degenerate",))
+
+
+def _bare(case_: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in case_.items() if key != "mistakes"}
 
 
 def _triangulate(topic: Topic, rng: np.random.Generator) -> None:
@@ -185,8 +213,8 @@ def _camera_from_world(rng: np.random.Generator) -> dict[str, Any]:
     return case(inputs, "X_cam", column(Rm * (Xm - pm)), {n: {"X_cam": column(v)} for n, v in wrong.items()})
 
 
-def _umeyama(rng: np.random.Generator, flag: str, with_scale: bool) -> dict[str, Any]:
-    n = int(rng.integers(4, 9))
+def _umeyama(rng: np.random.Generator, flag: str, with_scale: bool, n: int = 0) -> dict[str, Any]:
+    n = n or int(rng.integers(4, 9))
     source = rng.uniform(-3, 3, (n, 3)) * [1.0, 0.8, 0.6] + rng.uniform(-2, 2, 3)
     if flag == "planar":
         source[:, 2] = 0.5

@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
+from generator.angles import BEYOND, GRID, losing, vector_grid
 from generator.building import Topic, tolerance
 from generator.exact import expm, floats, hat, vector
 from generator.groups import REGIMES, Array, turn
@@ -38,7 +39,11 @@ def build(rng: np.random.Generator) -> Topic:
         topic.group(
             "quaternion.to_rotation", "eq-half", oracle, fine, [_to_rotation(p) for p in phis], flags=flags
         )
-        cases = [_from_rotation(p) for p in phis]
+        near = [abs(np.pi - float(np.linalg.norm(p))) for p in phis]
+        cases = [
+            {**_from_rotation(p), "tolerance": losing(fine, d, 2, DIVIDED)}
+            for p, d in zip(phis, near, strict=True)
+        ]
         topic.group("quaternion.from_rotation", "eq-half", oracle, fine, cases, flags=flags)
     axes = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.8, 0], [0, 0.6, -0.8], [2 / 3, -1 / 3, 2 / 3]])
     topic.group(
@@ -55,7 +60,29 @@ def build(rng: np.random.Generator) -> Topic:
     topic.group("quaternion.from_rotation", "eq-half", "definition", exact, [one], flags=("zero",))
     one = {"inputs": {"q": q}, "expected": {"R": eye}}
     topic.group("quaternion.to_rotation", "eq-half", "definition", exact, [one], flags=("zero",))
+    _every_size(topic, fine, oracle)
     return topic
+
+
+DIVIDED = "(R - R^T)/(4 w) with w = sqrt(1 + tr R)/2, which vanishes at a half turn: eps over w^2"
+
+
+def _every_size(topic: Topic, fine: dict[str, Any], oracle: str) -> None:
+    """Angles of a log-spaced grid; every one of the four entries is the largest once; other signs of w."""
+    for k, phi in enumerate(vector_grid([*GRID, *BEYOND])):
+        size = abs((GRID + BEYOND)[k])
+        case = {**_from_rotation(phi), "tolerance": losing(fine, abs(np.pi - size), 2, DIVIDED)}
+        topic.group("quaternion.from_rotation", "eq-half", oracle, fine, [case], flags=("any_angle",))
+        topic.group(
+            "quaternion.to_rotation", "eq-half", oracle, fine, [_to_rotation(phi)], flags=("any_angle",)
+        )
+    flipped = [_to_rotation(p, -1.0) for p in vector_grid([1e-3, 1.0, 2.0, 3.0])]
+    topic.group("quaternion.to_rotation", "eq-half", oracle, fine, flipped, flags=("other_sign",))
+    half = [
+        {"inputs": {"q": [0.0, *axis]}, "expected": {"R": 2 * np.outer(axis, axis) - np.eye(3)}}
+        for axis in np.eye(3)
+    ]
+    topic.group("quaternion.to_rotation", "eq-half", "definition", fine, half, flags=("pi",))
 
 
 def _quaternion(phi: Array, share: Any) -> list[Any]:
@@ -72,8 +99,8 @@ def _rotation(q: Array) -> Any:
     return expm(hat([angle * x / sine for x in v]))
 
 
-def _to_rotation(phi: Array) -> dict[str, Any]:
-    q = np.array(floats(_quaternion(phi, mpf(1) / 2)))
+def _to_rotation(phi: Array, sign: float = 1.0) -> dict[str, Any]:
+    q = sign * np.array(floats(_quaternion(phi, mpf(1) / 2)))
     R = _rotation(q)
     mistakes = {"conjugated": {"R": floats(R.T)}} if _tells(phi) else {}
     return {"inputs": {"q": q}, "expected": {"R": floats(R)}, "mistakes": mistakes}

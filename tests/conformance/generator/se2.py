@@ -8,7 +8,8 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from generator.building import Topic, tolerance
+from generator.angles import BEYOND, GRID, angle_grid, losing
+from generator.building import Topic, not_in_single, tolerance
 from generator.draws import log_uniform
 from generator.exact import column, floats, integrated, vector
 from generator.groups import REGIMES, SE2, Array
@@ -35,6 +36,7 @@ NOTES = {
         "the translation's column of your adjoint has the wrong sign",
         "[R, (-y, x); 0, 1] for [R, (y, -x); 0, 1]",
     ),
+    "other-end": ("your headings lie in [-pi, pi): half a turn is -pi; in (-pi, pi] it is pi", "[-pi, pi)"),
     "not-wrapped": ("your heading leaves (-pi, pi]", "theta_a + theta_b"),
 }
 
@@ -46,11 +48,15 @@ def build(rng: np.random.Generator) -> Topic:
     for flag in REGIMES:
         flags = () if flag == "generic" else (flag,)
         twists = [_twist(rng, flag) for _ in range(8)]
-        topic.group("se2.exp", "eq-exp-rigid", SERIES, fine, [_exp(x) for x in twists], flags=flags)
-        cases = [_left_jacobian(x, flag) for x in twists]
+        cases = [{**_exp(x), "tolerance": losing(fine, abs(x[2]), 1, CHORD)} for x in twists]
+        topic.group("se2.exp", "eq-exp-rigid", SERIES, fine, cases, flags=flags)
+        rules = [losing(fine, abs(x[2]), 2, CHORD_TWICE) for x in twists]
+        cases = [
+            {**_left_jacobian(x, flag), "tolerance": rule} for x, rule in zip(twists, rules, strict=True)
+        ]
         topic.group("se2.left_jacobian", "eq-left-jacobian", SERIES, fine, cases, flags=flags)
         if flag != "beyond_pi":
-            cases = [_log(x) for x in twists]
+            cases = [{**_log(x), "tolerance": rule} for x, rule in zip(twists, rules, strict=True)]
             topic.group("se2.log", "eq-log-rigid", "inverse of the series", fine, cases, flags=flags)
     poses = [_pose(rng) for _ in range(24)]
     oracle = "product of 50-digit matrices"
@@ -61,7 +67,78 @@ def build(rng: np.random.Generator) -> Topic:
     )
     cases = [_adjoint(x) for x in poses[:12]]
     topic.group("se2.adjoint", "eq-adjoint-rigid", "conjugated generators", fine, cases)
+    _every_size(topic, fine)
+    _special(topic, fine)
     return topic
+
+
+CHORD = "(1 - cos a)/a loses eps/a"
+CHORD_TWICE = "(1 - cos a)/a^2, or a sin a/(1 - cos a), loses eps/a^2"
+
+
+def _every_size(topic: Topic, fine: dict[str, Any]) -> None:
+    """Turns of a log-spaced grid, to both sides."""
+    flags = ("any_angle",)
+    for k, a in enumerate(angle_grid([*GRID, *BEYOND])):
+        xi, size = np.array([(1.5, -0.7)[k % 2], (0.4, 2.2, -1.1)[k % 3], a]), abs(a)
+        case = {**_exp(xi), "tolerance": losing(fine, size, 1, CHORD)}
+        topic.group("se2.exp", "eq-exp-rigid", SERIES, fine, [case], flags=flags)
+        case = _left_jacobian(xi, "small_angle" if size < 1e-3 else "")
+        case = {**case, "tolerance": losing(fine, size, 2, CHORD_TWICE)}
+        topic.group("se2.left_jacobian", "eq-left-jacobian", SERIES, fine, [case], flags=flags)
+        if size < np.pi:
+            case = {**_log(xi), "tolerance": losing(fine, size, 2, CHORD_TWICE)}
+            topic.group("se2.log", "eq-log-rigid", "inverse of the series", fine, [case], flags=flags)
+
+
+def _special(topic: Topic, fine: dict[str, Any]) -> None:
+    """No turn, no way, right angles, half turns, and sums at the interval's ends."""
+    still = [np.array(x) for x in ([0.0, 0.0, 0.0], [1.5, -0.4, 0.0], [0.0, 0.0, 0.8], [0.0, 0.0, -2.9])]
+    topic.group(
+        "se2.exp", "eq-exp-rigid", SERIES, fine, [_without_mistakes(_exp(x)) for x in still], flags=("zero",)
+    )
+    topic.group(
+        "se2.log",
+        "eq-log-rigid",
+        "inverse of the series",
+        fine,
+        [_without_mistakes(_log(x)) for x in still],
+        flags=("zero",),
+    )
+    cases = [_jacobian_only(x) for x in still]
+    topic.group("se2.left_jacobian", "eq-left-jacobian", SERIES, fine, cases, flags=("zero",))
+    cases = [_inverse_only(x) for x in still]
+    topic.group("se2.inverse", "eq-a2-1", "inverse of a 50-digit matrix", fine, cases, flags=("zero",))
+    cases = [_plain(SE2.adjoint(_matrix(x)), x) for x in still]
+    topic.group("se2.adjoint", "eq-adjoint-rigid", "conjugated generators", fine, cases, flags=("zero",))
+    oracle = "product of 50-digit matrices"
+    a, b = np.array([1.0, 2.0, 2.5]), np.array([-0.5, 0.7, 2.9])
+    pairs = [(still[0], a), (a, still[0]), (still[1], a), (a, b), (-a, -b), (a, -b)]
+    cases = [_without_mistakes(_compose(x, y)) for x, y in pairs]
+    topic.group("se2.compose", "eq-a2-1", oracle, fine, cases, flags=("zero",))
+    top = {
+        "inputs": {"a": [1.0, 2.0, np.pi / 2], "b": [3.0, 4.0, np.pi / 2]},
+        "expected": {"x": [-3.0, 5.0, np.pi]},
+    }
+    top["mistakes"] = {"other-end": {"x": [-3.0, 5.0, -np.pi]}}
+    rule = not_in_single(fine)
+    topic.group("se2.compose", "eq-a2-1", "definition", rule, [top], flags=("pi",))
+
+
+def _without_mistakes(case: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in case.items() if key != "mistakes"}
+
+
+def _jacobian_only(x: Array) -> dict[str, Any]:
+    return _without_mistakes(_left_jacobian(x, ""))
+
+
+def _inverse_only(x: Array) -> dict[str, Any]:
+    return _without_mistakes(_inverse(x))
+
+
+def _plain(A: Any, x: Array) -> dict[str, Any]:
+    return {"inputs": {"x": x}, "expected": {"A": floats(A)}}
 
 
 def _twist(rng: np.random.Generator, flag: str) -> Array:

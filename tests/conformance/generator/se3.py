@@ -9,6 +9,7 @@ import numpy as np
 from mpmath import mpf
 
 from generator import exact
+from generator.angles import BEYOND, GRID, MANY_TURNS, losing, vector_grid
 from generator.building import Topic, tolerance
 from generator.exact import column, derivative, floats, matrix, vector
 from generator.groups import (
@@ -91,28 +92,134 @@ def build(rng: np.random.Generator) -> Topic:
     cases = [_act_jacobian(motion(rng), shift(rng)) for _ in range(8)]
     oracle = "central differences of the series, 50 digits"
     topic.group("se3.act_jacobian", "eq-act-jacobian", oracle, fine, cases)
+    _every_size(topic)
+    _special(topic, rng)
     return topic
+
+
+COSINE = "(1 - cos a)/a^2 loses eps/a"
+QUARTIC = "(1 - a^2/2 - cos a)/a^4, or a sin a/(1 - cos a), loses eps/a^2"
+HALF = "1 + cos a, or R - R^T over the sine of an arc cosine, near a half turn: eps over its squared distance"
+SHIFTS = np.array([[1.5, -0.4, 0.8], [-0.6, 2.2, -1.1]])
+
+
+def _losing(rule: dict[str, Any], xi: Array, power: int, *, half: bool = False) -> dict[str, Any]:
+    """Tolerance of a case with the digits that a common formula loses at small angles, or near pi."""
+    a = float(np.linalg.norm(xi[3:]))
+    if half and a > 2.0:
+        return losing(rule, abs(np.pi - a), 2, HALF)
+    return losing(rule, a, power, COSINE if power == 1 else QUARTIC)
+
+
+def _every_size(topic: Topic) -> None:
+    """Angles of a log-spaced grid, with translations of order 1."""
+    twists = [np.array([*SHIFTS[k % 2], *phi]) for k, phi in enumerate(vector_grid([*GRID, *BEYOND], 3))]
+    _regime(topic, "any_angle", twists)
+    for group in topic.groups:  # each whole answer is long: every third case has the wrong ones, too
+        if group["flags"] == ["any_angle"]:
+            rows = group["cases"]
+            group["cases"] = [row if k % 3 == 0 else _bare(row) for k, row in enumerate(rows)]
+    fine = tolerance(5e-14, ROUNDING)
+    for a, phi in zip(MANY_TURNS, vector_grid(MANY_TURNS, 3), strict=True):
+        rule = tolerance(
+            float(f"{1e-14 * a:.1e}"), "twenty squarings, or a root: eps of the angle", float32=1e-2
+        )
+        twist_ = np.array([*SHIFTS[0], *phi])
+        topic.group("se3.exp", "eq-exp-rigid", SERIES, rule, [_exp(twist_)], flags=("many_turns",))
+    for size, regime in ((1e-6, "near"), (1e4, "far")):
+        cases = [
+            _exp(np.array([*(size * SHIFTS[k % 2]), *phi]))
+            for k, phi in enumerate(vector_grid([0.3, 1.2, 2.9]))
+        ]
+        topic.group("se3.exp", "eq-exp-rigid", SERIES, fine, cases, flags=(regime,))
+
+
+def _special(topic: Topic, rng: np.random.Generator) -> None:
+    """No rotation, no translation, the identity; an interpolation's ends, outside, and the long way round."""
+    fine, near = tolerance(5e-14, ROUNDING), tolerance(1e-13, "a logarithm, an exponential and two products")
+    zero = [np.zeros(6), np.array([*SHIFTS[0], 0, 0, 0]), np.array([0, 0, 0, 0.4, -1.1, 0.7])]
+    cases = [_bare(_left_jacobian(x, "")) for x in zero]
+    topic.group("se3.left_jacobian", "eq-jacobian-rigid", SERIES, fine, cases, flags=("zero",))
+    cases = [_bare(_inverse_jacobian(x, "")) for x in zero]
+    topic.group(
+        "se3.left_jacobian_inverse", "eq-jacobian-rigid", "exact inverse", fine, cases, flags=("zero",)
+    )
+    topic.group("se3.exp", "eq-exp-rigid", SERIES, fine, [_bare(_exp(zero[2]))], flags=("no_translation",))
+    cases = [_bare(_log(x)) for x in zero[1:]]
+    topic.group(
+        "se3.log",
+        "eq-log-rigid",
+        "Newton's iteration on the series, 50 digits",
+        fine,
+        cases,
+        flags=("no_rotation",),
+    )
+    one, T = np.eye(4), motion(rng)
+    cases = [_bare(_compose(a, b)) for a, b in ((one, T), (T, one), (one, one))]
+    topic.group("se3.compose", "eq-a2-1", "50-digit matrix product", fine, cases, flags=("identity",))
+    topic.group(
+        "se3.inverse", "eq-centre", "50-digit inverse", fine, [_bare(_inverse(one))], flags=("identity",)
+    )
+    topic.group(
+        "se3.adjoint", "eq-adjoint-rigid", "definition", fine, [_bare(_adjoint(one))], flags=("identity",)
+    )
+    origin = [_bare(_act(T, np.zeros(3))), _bare(_act(one, SHIFTS[0]))]
+    topic.group("se3.act", "eq-a2-1", "50-digit matrix product", fine, origin, flags=("zero",))
+    cases = [_bare(_act_jacobian(T, np.zeros(3))), _bare(_act_jacobian(one, SHIFTS[0]))]
+    oracle = "central differences of the series, 50 digits"
+    topic.group("se3.act_jacobian", "eq-act-jacobian", oracle, fine, cases, flags=("zero",))
+    xi = np.array([*SHIFTS[1], 0.5, -0.3, 0.7])
+    cases = [_bare(_between(T, xi, f)) for f in (0.0, 1.0, -0.5, 1.5)]
+    topic.group("se3.interpolate", "eq-exp-rigid", SERIES, near, cases, flags=("outside",))
+    cases = [_bare(_between(T, np.zeros(6), f)) for f in (0.0, 0.3, 1.0)]
+    topic.group("se3.interpolate", "eq-exp-rigid", SERIES, near, cases, flags=("same",))
+    long = [
+        _bare(_between(T, np.array([*SHIFTS[0], *phi]), 0.4)) for phi in vector_grid([2.6, 2.9, 3.0, 3.1])
+    ]
+    topic.group(
+        "se3.interpolate",
+        "eq-exp-rigid",
+        SERIES,
+        tolerance(1e-12, "the same, and 1/sin near pi"),
+        long,
+        flags=("long_way",),
+    )
+
+
+def _bare(case: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in case.items() if key != "mistakes"}
 
 
 def _regime(topic: Topic, flag: str, twists: list[Array]) -> None:
     """Exponential, logarithm and Jacobians."""
     flags = () if flag == "generic" else (flag,)
     fine = tolerance(5e-14, ROUNDING)
-    topic.group("se3.exp", "eq-exp-rigid", SERIES, fine, [_exp(x) for x in twists], flags=flags)
-    cases = [_left_jacobian(x, flag) for x in twists]
+    cases = [{**_exp(x), "tolerance": _losing(fine, x, 1)} for x in twists]
+    topic.group("se3.exp", "eq-exp-rigid", SERIES, fine, cases, flags=flags)
+    cases = [{**_left_jacobian(x, _branch(flag, x)), "tolerance": _losing(fine, x, 2)} for x in twists]
     topic.group("se3.left_jacobian", "eq-jacobian-rigid", SERIES, fine, cases, flags=flags)
     reason = "the inverse has a pole at 2 pi: its condition, at most 100 for these angles, times the rounding"
     pole = tolerance(1e-13, reason, float32=1e-3)
-    cases = [_inverse_jacobian(x, flag) for x in twists[:6]]
+    some = twists if flag == "any_angle" else twists[:6]
+    cases = [
+        {**_inverse_jacobian(x, _branch(flag, x)), "tolerance": _losing(pole, x, 2, half=True)} for x in some
+    ]
     topic.group("se3.left_jacobian_inverse", "eq-jacobian-rigid", "exact inverse", pole, cases, flags=flags)
     if flag == "beyond_pi":
         return
     reason = "R is rounded to eps and the translation is divided by V, whose inverse is of order 1"
     rule = tolerance(1e-14, reason, float32=2e-3)
-    cases = [_log(x) for x in twists]
+    twists = [x for x in twists if np.linalg.norm(x[3:]) < np.pi]
+    cases = [{**_log(x), "tolerance": _losing(rule, x, 2, half=True)} for x in twists]
     topic.group(
         "se3.log", "eq-log-rigid", "Newton's iteration on the series, 50 digits", rule, cases, flags=flags
     )
+
+
+def _branch(flag: str, xi: Array) -> str:
+    """Which mistakes are listed: on the grid, those of small angles below a thousandth."""
+    small = flag == "any_angle" and np.linalg.norm(xi[3:]) < 1e-3
+    return "small_angle" if small else flag
 
 
 def _exp(xi: Array) -> dict[str, Any]:

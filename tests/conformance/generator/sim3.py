@@ -9,8 +9,9 @@ import numpy as np
 from mpmath import mpf
 
 from generator import exact
+from generator.angles import AXES, angle_grid, losing
 from generator.building import Topic, tolerance
-from generator.draws import log_uniform
+from generator.draws import digits, log_uniform
 from generator.exact import column, floats, integrated, matrix, vector
 from generator.groups import SIM3, Array, product, shift, turn
 from generator.se3 import ROUNDING, case
@@ -55,9 +56,12 @@ def build(rng: np.random.Generator) -> Topic:
     for flag in REGIMES:
         flags = () if flag == "generic" else (flag,)
         twists = [_twist(rng, flag) for _ in range(8)]
-        topic.group("sim3.exp", "eq-exp-similarity", SERIES, fine, [_exp(x) for x in twists], flags=flags)
+        rules = [_losing(fine, x) for x in twists]
+        cases = [{**_exp(x), "tolerance": rule} for x, rule in zip(twists, rules, strict=True)]
+        topic.group("sim3.exp", "eq-exp-similarity", SERIES, fine, cases, flags=flags)
         oracle = "Newton's iteration on the series, 50 digits"
-        topic.group("sim3.log", "eq-exp-similarity", oracle, fine, [_log(x) for x in twists], flags=flags)
+        cases = [{**_log(x), "tolerance": rule} for x, rule in zip(twists, rules, strict=True)]
+        topic.group("sim3.log", "eq-exp-similarity", oracle, fine, cases, flags=flags)
     some = [np.array(floats(SIM3.exp(vector(_twist(rng, "generic"))))) for _ in range(24)]
     cases = [_compose(a, b) for a, b in zip(some[::2], some[1::2], strict=True)]
     topic.group("sim3.compose", "eq-exp-similarity", "50-digit matrix product", fine, cases)
@@ -73,7 +77,85 @@ def build(rng: np.random.Generator) -> Topic:
         topic.group("sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=flags)
     cases = [_left_jacobian(1e-4 * _twist(rng, "generic"), small=True) for _ in range(4)]
     topic.group("sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=("tiny",))
+    _every_size(topic, fine)
+    _special(topic, fine)
     return topic
+
+
+DIFFERENCE = "(s - 1)/sigma and (1 - cos a)/a lose eps over the smaller of sigma and a"
+SHIFT = np.array([1.5, -0.4, 0.8])
+
+
+def _every_size(topic: Topic, fine: dict[str, Any]) -> None:
+    """Angle and scale on log-spaced grids, against each other: both small, one small, both large."""
+    sizes = (1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 2e-3, 3e-2, 0.3, 0.9)
+    some = []
+    for k, a in enumerate(angle_grid([*sizes, 1.4, 2.0, 2.6, 3.0, 3.1])):
+        for j, sigma in enumerate((sizes[k % 9], sizes[(4 * k + 3) % 9], 1.3 * (-1) ** k)):
+            axis = AXES[(k + j) % len(AXES)]
+            some.append(digits(np.array([*(SHIFT * (-1) ** k), *(abs(a) * axis), sigma * (-1) ** j])))
+    rules = [_losing(fine, x) for x in some]
+    cases = [{**_bare(_exp(x)), "tolerance": rule} for x, rule in zip(some, rules, strict=True)]
+    topic.group("sim3.exp", "eq-exp-similarity", SERIES, fine, cases, flags=("any_size",))
+    cases = [{**_bare(_log(x)), "tolerance": rule} for x, rule in zip(some, rules, strict=True)]
+    oracle = "Newton's iteration on the series, 50 digits"
+    topic.group("sim3.log", "eq-exp-similarity", oracle, fine, cases, flags=("any_size",))
+    cases = [_bare(_left_jacobian(x)) for x in some[::3]]
+    topic.group(
+        "sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=("any_size",)
+    )
+
+
+def _losing(rule: dict[str, Any], xi: Array) -> dict[str, Any]:
+    angle, sigma = float(np.linalg.norm(xi[3:6])), abs(float(xi[6]))
+    if np.pi - angle < 0.2:
+        return losing(rule, np.pi - angle, 2, "R - R^T over the sine of an arc cosine near a half turn")
+    return losing(rule, min(angle, sigma), 1, DIFFERENCE)
+
+
+def _special(topic: Topic, fine: dict[str, Any]) -> None:
+    """Exact zeros: no rotation, scale 1, no translation, in all combinations."""
+    phi, none = np.array([0.4, -1.1, 0.7]), np.zeros(3)
+    some = {
+        "zero": [np.zeros(7)],
+        "no_rotation": [np.array([*SHIFT, *none, sigma]) for sigma in (0.0, 0.6, -0.6, 1e-6, 2.5)],
+        "no_scale": [np.array([*SHIFT, *(x * phi), 0.0]) for x in (1.0, 1e-3, 1e-7, 2.2)],
+        "no_translation": [np.array([*none, *phi, 0.4])],
+    }
+    oracle = "Newton's iteration on the series, 50 digits"
+    for flag, twists in some.items():
+        cases = [_bare(_exp(x)) for x in twists]
+        topic.group("sim3.exp", "eq-exp-similarity", SERIES, fine, cases, flags=(flag,))
+        rule = tolerance(5e-14, ROUNDING, absolute=5e-15) if flag == "zero" else fine
+        topic.group(
+            "sim3.log", "eq-exp-similarity", oracle, rule, [_bare(_log(x)) for x in twists], flags=(flag,)
+        )
+        cases = [_bare(_left_jacobian(x)) for x in twists]
+        topic.group(
+            "sim3.left_jacobian", "eq-jacobian-halving", f"{SERIES}, of ad", fine, cases, flags=(flag,)
+        )
+    scaled = [np.array(floats(SIM3.exp(vector([*SHIFT, *phi, sigma])))) for sigma in (-4.0, 4.0, 0.0)]
+    cases = [_bare(_inverse(S)) for S in scaled]
+    topic.group("sim3.inverse", "eq-exp-similarity", "50-digit inverse", fine, cases, flags=("any_size",))
+    cases = [_bare(_act(S, SHIFT)) for S in scaled]
+    topic.group("sim3.act", "eq-exp-similarity", "50-digit product", fine, cases, flags=("any_size",))
+    cases = [_bare(_adjoint(S)) for S in scaled]
+    topic.group(
+        "sim3.adjoint",
+        "eq-adjoint-similarity",
+        "conjugated generators, 50 digits",
+        fine,
+        cases,
+        flags=("any_size",),
+    )
+    cases = [_bare(_compose(a, b)) for a, b in ((scaled[0], np.eye(4)), (scaled[0], scaled[1]))]
+    topic.group(
+        "sim3.compose", "eq-exp-similarity", "50-digit matrix product", fine, cases, flags=("any_size",)
+    )
+
+
+def _bare(case: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in case.items() if key != "mistakes"}
 
 
 def _twist(rng: np.random.Generator, flag: str) -> Array:

@@ -9,9 +9,11 @@ import numpy as np
 from mpmath import mpf
 from scipy.stats import norm
 
+from generator.angles import AXES, BEYOND, GRID, MANY_TURNS, losing, vector_grid
 from generator.building import Topic, tolerance
-from generator.draws import rotation_vector
+from generator.draws import digits, rotation_vector
 from generator.exact import column, expm, floats, hat, matrix, vector
+from generator.similarity import rotation
 from vslam_ref.arrays import Array
 
 TOPIC, CHAPTER = "so3", 2
@@ -20,6 +22,10 @@ ROUNDING = "a few dozen operations on numbers of order 1, each within eps"
 NEAR_POLE = "the inverse has a pole at 2 pi: its condition times eps"
 
 NOTES = {
+    "mirror": (
+        "your nearest rotation is a mirror, det R = -1: the last singular vector must change its sign",
+        "R = U V^T for U diag(1, 1, det U V^T) V^T",
+    ),
     "transposed": (
         "your rotation is the transpose of the right one: the angle's sign, or the other frame",
         "I - sin(a)/a hat(phi) + (1 - cos(a))/a^2 hat(phi)^2",
@@ -59,6 +65,8 @@ def build(rng: np.random.Generator) -> Topic:
     oracle = "polar factor by Newton's iteration, 50 digits"
     topic.group("so3.nearest", "eq-log-rotation", oracle, rule, [_nearest(rng) for _ in range(15)])
     _random(topic)
+    _every_size(topic)
+    _special(topic, rng)
     return topic
 
 
@@ -66,16 +74,131 @@ def _regime(topic: Topic, flag: str, phis: list[Array]) -> None:
     """Exponential, Jacobians and logarithm at some rotation vectors."""
     flags = () if flag == "generic" else (flag,)
     fine, pole = tolerance(2e-14, ROUNDING), tolerance(1e-13, NEAR_POLE, float32=1e-3)
-    topic.group("so3.exp", "eq-rodrigues", SERIES, fine, [_exp(p) for p in phis], flags=flags)
-    cases = [_jacobian(p, flag) for p in phis]
+    rule = tolerance(1e-13, SQUARED) if flag == "beyond_pi" else fine
+    topic.group("so3.exp", "eq-rodrigues", SERIES, rule, [_exp(p) for p in phis], flags=flags)
+    cases = [{**_jacobian(p, flag), "tolerance": losing(fine, _size(p), 1, COSINE)} for p in phis]
     topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", fine, cases, flags=flags)
     oracle = "exact inverse of the left Jacobian"
-    cases = [_inverse(p) for p in phis]
+    rules = [
+        losing(pole, np.pi - _size(p), 1, HALF) if flag == "near_pi" else losing(pole, _size(p), 2, RATIO)
+        for p in phis
+    ]
+    cases = [{**_inverse(p), "tolerance": rule} for p, rule in zip(phis, rules, strict=True)]
     topic.group("so3.left_jacobian_inverse", "eq-v-inverse", oracle, pole, cases, flags=flags)
     if flag != "beyond_pi":
-        cases = [_log(p) for p in phis]
+        rule = _log_tolerance(flag)
+        cases = [{**_log(p), "tolerance": losing(rule, np.pi - _size(p), 2, ARC)} for p in phis]
         oracle = "Newton's iteration on the series, 50 digits"
-        topic.group("so3.log", "eq-log-rotation", oracle, _log_tolerance(flag), cases, flags=flags)
+        topic.group("so3.log", "eq-log-rotation", oracle, rule, cases, flags=flags)
+
+
+def _size(phi: Array) -> float:
+    return float(np.linalg.norm(phi))
+
+
+SQUARED = "a general matrix exponential halves the angle and squares as often: some ten eps of the angle"
+COSINE = "(1 - cos a)/a^2 loses eps/a of the entries"
+RATIO = "a sin a/(1 - cos a) loses eps/a^2"
+HALF = "1 + cos a near a half turn: eps over the distance from pi"
+ARC = "R - R^T over the sine of an arc cosine near a half turn: eps over its squared distance from pi"
+
+
+def _every_size(topic: Topic) -> None:
+    """Angles of a log-spaced grid, about the axes of coordinates and others."""
+    fine, pole = tolerance(2e-14, ROUNDING), tolerance(1e-13, NEAR_POLE, float32=1e-3)
+    squared = tolerance(1e-13, SQUARED)
+    flags = ("any_angle",)
+    for k, phi in enumerate(vector_grid([*GRID, *BEYOND])):
+        a = abs((GRID + BEYOND)[k])
+        case = {**_exp(phi), "tolerance": fine if a < np.pi else squared}
+        topic.group("so3.exp", "eq-rodrigues", SERIES, fine, [case], flags=flags)
+        case = {
+            **_jacobian(phi, "small_angle" if a < 1e-3 else ""),
+            "tolerance": losing(fine if a < np.pi else squared, a, 1, COSINE),
+        }
+        topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", fine, [case], flags=flags)
+        near = abs(np.pi - a)
+        rule = losing(pole, near, 1, HALF) if near < 0.1 else losing(pole, a, 2, RATIO)
+        case = {**_inverse(phi), "tolerance": rule}
+        oracle = "exact inverse of the left Jacobian"
+        topic.group("so3.left_jacobian_inverse", "eq-v-inverse", oracle, pole, [case], flags=flags)
+        if a < np.pi:
+            rule = _log_tolerance("small_angle" if a < 0.1 else "")
+            case = {**_log(phi), "tolerance": losing(rule, near, 2, ARC)}
+            oracle = "Newton's iteration on the series, 50 digits"
+            topic.group("so3.log", "eq-log-rotation", oracle, rule, [case], flags=flags)
+    for a, phi in zip(MANY_TURNS, vector_grid(MANY_TURNS), strict=True):
+        rule = tolerance(float(f"{1e-14 * a:.1e}"), SQUARED, float32=1e-2)
+        topic.group("so3.exp", "eq-rodrigues", SERIES, rule, [_exp(phi)], flags=("many_turns",))
+        case = _jacobian(phi, "")
+        topic.group("so3.left_jacobian", "eq-v", f"{SERIES}, integrated", rule, [case], flags=("many_turns",))
+
+
+def _special(topic: Topic, rng: np.random.Generator) -> None:
+    """Zero, the ends of an interpolation and beyond, the long way round, mirrors, and right angles."""
+    zero, exact = np.zeros(3), tolerance(0.0, "exact", absolute=1e-300)
+    one = {"inputs": {"phi": zero}, "expected": {"J": np.eye(3)}}
+    topic.group("so3.left_jacobian", "eq-v", "definition", exact, [one], flags=("zero",))
+    topic.group("so3.left_jacobian_inverse", "eq-v-inverse", "definition", exact, [one], flags=("zero",))
+    near = tolerance(1e-13, "a logarithm and an exponential")
+    parts = (0.0, 1.0, -0.5, 1.5, 3.0)
+    a, phi = rotation_vector(rng, 0.2, 3.0), rotation_vector(rng, 0.3, 1.2)
+    cases = [_on_the_way(a, phi, f) for f in parts]
+    topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, cases, flags=("outside",))
+    cases = [_on_the_way(a, zero, f) for f in (0.0, 0.3, 1.0)]
+    topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, cases, flags=("same",))
+    # the sum of both turns is more than a half: the short way is back
+    long = [
+        _on_the_way(digits(2.5 * n), digits(x * n), 0.4)
+        for n, x in zip(AXES, (2.9, 3.1, 2.0, -2.9, 3.0), strict=True)
+    ]
+    topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, long, flags=("long_way",))
+    tiny = [
+        _on_the_way(a, digits(x * n), 0.7) for n, x in zip(AXES, (1e-9, 1e-6, 1e-4, 1e-3, 1e-2), strict=True)
+    ]
+    topic.group("so3.interpolate", "eq-rodrigues", SERIES, near, tiny, flags=("small_angle",))
+    rule = tolerance(1e-13, "condition of the polar factor, below 50, times eps", float32=1e-4)
+    oracle = "largest trace(R^T M) by Horn's quaternion, 50 digits"
+    cases = [_nearest_to_mirror(rng) for _ in range(8)]
+    topic.group("so3.nearest", "eq-log-rotation", oracle, rule, cases, flags=("mirrored",))
+    eye = {"inputs": {"M": np.eye(3)}, "expected": {"R": np.eye(3)}}
+    topic.group("so3.nearest", "eq-log-rotation", "definition", rule, [eye], flags=("identity",))
+    # exact matrices of right angles: sines of 1 and cosines of 0
+    turns = [np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])]
+    starts = (np.array([np.pi / 2, 0, 0]), 2 * np.pi / 3 / np.sqrt(3) * np.ones(3))
+    cases = [
+        {"inputs": {"R": R}, "expected": {"phi": floats(log_of(R, s))}}
+        for R, s in zip(turns, starts, strict=True)
+    ]
+    topic.group(
+        "so3.log", "eq-log-rotation", SERIES, tolerance(1e-14, ROUNDING), cases, flags=("right_angles",)
+    )
+
+
+def _on_the_way(a: Array, phi: Array, fraction: float) -> dict[str, Any]:
+    """Part of the way from Exp(a) to Exp(a) Exp(phi), the angle of phi below pi."""
+    A = expm(hat(vector(a)))
+    Ra, Rb = np.array(floats(A)), np.array(floats(A * expm(hat(vector(phi)))))
+    step = log_of(np.array(floats(polar(matrix(Ra)).T * polar(matrix(Rb)))), phi)
+    R = polar(matrix(Ra)) * expm(hat([mpf(fraction) * s for s in step]))
+    return {"inputs": {"a": Ra, "b": Rb, "fraction": fraction}, "expected": {"R": floats(R)}}
+
+
+def _nearest_to_mirror(rng: np.random.Generator) -> dict[str, Any]:
+    """A matrix of negative determinant: the polar factor is a mirror, and the nearest rotation is not."""
+    R = expm(hat(vector(rotation_vector(rng, 0.2, 3.0))))
+    M = digits(
+        np.array(floats(R))
+        @ np.diag([1.0, 1.0, -1.0])
+        @ np.diag(rng.uniform([1.5, 1.0, 0.3], [2.0, 1.4, 0.7]))
+    )
+    right = rotation(matrix(M))
+    mirror = polar(matrix(M))
+    return {
+        "inputs": {"M": M},
+        "expected": {"R": floats(right)},
+        "mistakes": {"mirror": {"R": floats(mirror)}},
+    }
 
 
 def _ends(topic: Topic) -> None:
@@ -127,7 +250,7 @@ def _inverse(phi: Array) -> dict[str, Any]:
 
 def _log_tolerance(flag: str) -> dict[str, Any]:
     if flag == "near_pi":
-        reason = "the entries of R are rounded to eps; a program through the quaternion keeps all digits"
+        reason = "the entries of R are rounded to eps; through the quaternion all digits are kept"
         return tolerance(1e-14, reason, float32=2e-3)
     if flag == "small_angle":
         return tolerance(1e-14, "the off-diagonal entries carry the angle", absolute=2.3e-16, float32=1e-4)
@@ -205,6 +328,8 @@ def _random(topic: Topic) -> None:
             **{"output": "R", "measure": measure, "samples": samples},
             **{"low": low, "high": high, "false_alarm": rate},
         }
+        if measure == "worst_orthogonality":
+            rule["float32"] = {"low": 0.0, "high": 2e-6}  # a dozen roundings of entries of order 1
         if measure in uneven:
             rule["mistakes"] = {"uniform-angles": uneven[measure]}
         case = {"inputs": {"N": samples}, "expected": {"R": []}}

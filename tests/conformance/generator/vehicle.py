@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
+from generator import ekf_others
 from generator.building import Topic, tolerance
 from generator.draws import log_uniform
 from generator.exact_arrays import Big, big, doubles, stack
@@ -33,6 +34,10 @@ NOTES = {
     "turn-first": (
         "your car turns before it drives: its place moves along the new heading",
         "x + v dt cos(theta + v dt tan(steering)/wheelbase)",
+    ),
+    "ahead-then-turn": (
+        "you go ahead and turn then; between two poses with a constant yaw rate lies an arc",
+        "x + v dt cos(theta)",
     ),
     "exact-arc": (
         "your car drives along the arc; B4 drives along the tangent, then turns",
@@ -100,6 +105,7 @@ def build(rng: np.random.Generator) -> Topic:
     _sightings(topic, rng, rule)
     cases = [_other_convention(regimes[""][1]()) for _ in range(5)]
     topic.group("vehicle.ackermann", "eq-b4", DEFINITION, rule, cases, flags=("convention",))
+    ekf_others.yaw_rates(topic, rng)
     return topic
 
 

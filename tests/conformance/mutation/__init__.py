@@ -8,6 +8,7 @@ shows what the vectors do not see.
 module          holds
 ==============  ==================================================================================
 ``sites``       where a function can be changed, and how
+``regimes``     where it treats some arguments apart: branches, series, special values, later blocks
 ``child``       the library with one change, in a process of its own
 ``study``       a seeded sample of mutants, run side by side
 ``equivalent``  changes that change nothing, and why

@@ -96,10 +96,12 @@ def _write(pipe: int, text: str) -> None:
         data = data[os.write(pipe, data) :]
 
 
-def run_mutant(mutant: Mutant, names: Sequence[str], seconds: float) -> Verdict:
+def run_mutant(
+    mutant: Mutant, names: Sequence[str], seconds: float, change: Callable[[str, int], str] = mutated
+) -> Verdict:
     """Ask the vectors of a mutant until one fails."""
     source, path = source_of(mutant.module)
-    text = mutated(source, mutant.number) + PRELUDE
+    text = change(source, mutant.number) + PRELUDE
 
     def work() -> str:
         os.environ["VSLAM_REF_BACKEND"] = "numpy"
@@ -114,7 +116,7 @@ def run_mutant(mutant: Mutant, names: Sequence[str], seconds: float) -> Verdict:
 
 
 def _first_failure(names: Sequence[str]) -> str:
-    """Id of the first case that is not right any more, or "passed"."""
+    """Id of the first case that is not right any more, lost digits included, or "passed"."""
     import numpy as np
 
     from vslam_ref.conformance.conventions import Convention
@@ -127,7 +129,7 @@ def _first_failure(names: Sequence[str]) -> str:
         for name in names:
             file = load(name)
             for case in file.cases:
-                if ask(asked, file, case, Convention(), "float64").status in ("failed", "error"):
+                if ask(asked, file, case, Convention(), "float64").status != "passed":
                     return case.id
     return "passed"
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 from mutation.child import ROOT, Verdict, executed, run_mutant, source_of
 from mutation.equivalent import EQUIVALENT
-from mutation.sites import Mutant, mutants
+from mutation.regimes import regime_mutants, with_regime
+from mutation.sites import Mutant, mutants, mutated
 
 ROOMS = ("geometry", "estimation", "filters", "features", "grids")
 NOT_ASKED = {
@@ -102,7 +103,14 @@ def modules() -> list[str]:
 
 
 def study(
-    sample: int, seed: int, jobs: int, told: Callable[[Mutant, Verdict], None] = lambda m, v: None
+    sample: int,
+    seed: int,
+    jobs: int,
+    told: Callable[[Mutant, Verdict], None] = lambda m, v: None,
+    *,
+    regimes: bool = False,
+    chapters: Sequence[str] = (),
+    inside: Sequence[str] = ("vslam_ref",),
 ) -> Study:
     """Run a sample of mutants.
 
@@ -115,6 +123,12 @@ def study(
         Mutants side by side.
     told : callable
         Called with each verdict.
+    regimes : bool
+        Change branches, series and special values, in all functions, for operators in those that cite.
+    chapters : sequence of str
+        Only the vectors of these, as "02", and what they run; all if empty.
+    inside : sequence of str
+        Only modules whose names begin so.
     """
     import random
 
@@ -123,18 +137,20 @@ def study(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import numpy  # noqa: F401 - imported once, before the forks
 
-    names = _names()
-    everything = [m for module in modules() for m in mutants(module, source_of(module)[0])]
+    names = [name for name in _names() if not chapters or name[:2] in chapters]
+    found, change = (regime_mutants, with_regime) if regimes else (mutants, mutated)
+    those = [module for module in modules() if module.startswith(tuple(inside))]
+    everything = [m for module in those for m in found(module, source_of(module)[0])]
     run = executed(names)
     bearing = {(m.module, m.function) for m in everything}
     reached = [m for m in everything if (m.module, m.line) in run]
     seen = {(m.module, m.function) for m in reached} - set(NOT_ASKED_PAIRS)
     usable = [m for m in reached if (m.module, m.function) in seen]
-    inside = [m for m in everything if (m.module, m.function) in seen]
+    within = [m for m in everything if (m.module, m.function) in seen]
     chosen = random.Random(seed).sample(usable, min(sample, len(usable)))
 
     def judge(mutant: Mutant) -> tuple[Mutant, Verdict]:
-        verdict = run_mutant(mutant, names, LONGEST)
+        verdict = run_mutant(mutant, names, LONGEST, change)
         told(mutant, verdict)
         return mutant, verdict
 
@@ -144,7 +160,7 @@ def study(
         functions=sorted(f"{m}.{f}" for m, f in seen),
         unseen=sorted(f"{m}.{f}" for m, f in bearing - seen),
         possible=len(usable),
-        unreached=len(inside) - len(usable),
+        unreached=len(within) - len(usable),
         sample=results,
         seconds=time.monotonic() - began,
     )

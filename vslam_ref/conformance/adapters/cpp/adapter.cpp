@@ -514,7 +514,17 @@ Mat so3_nearest(const Mat& M) {  // Newton's iteration X <- (X + X^-T)/2 for the
     X = Y;
     if (moved < 1e-15) break;
   }
-  return X;
+  const double det = X(0, 0) * (X(1, 1) * X(2, 2) - X(1, 2) * X(2, 1)) - X(0, 1) * (X(1, 0) * X(2, 2) - X(1, 2) * X(2, 0)) +
+                     X(0, 2) * (X(1, 0) * X(2, 1) - X(1, 1) * X(2, 0));
+  if (det > 0) return X;
+  // a mirror: turn it about in the direction that M stretches least, found by inverse iteration on X^T M
+  const Mat back = inverse(transpose(X) * M);
+  Vec v = {0.6, -0.5, 0.62};
+  for (int k = 0; k < 400; ++k) {
+    v = back * v;
+    v = (1 / norm(v)) * v;
+  }
+  return X * (eye(3) - 2.0 * (column(v) * transpose(column(v))));
 }
 
 Mat rigid(const Mat& A, const Vec& t) {

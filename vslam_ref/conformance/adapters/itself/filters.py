@@ -15,7 +15,10 @@ from vslam_ref.filters.carleman_ekf import LiftedCarlemanEkf, ReducedCarlemanEkf
 from vslam_ref.filters.carleman_ekf.reduced_moments import start_moments
 from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
+from vslam_ref.filters.polar_update import update_polar
 from vslam_ref.filters.range_bearing import cartesian_from_polar
+from vslam_ref.geometry import se2
+from vslam_ref.grids.landmarks.association import gate
 
 Slam = TypeVar("Slam", bound=SlamFilter)
 Steps = list[dict[str, Array]]
@@ -61,6 +64,31 @@ def _predict(
     slam = _slam(x, P)
     slam.predict(vehicle.ackermann_increment(control[None], cov_u, wheelbase, dt))
     return _state(slam)
+
+
+def _predict_additive(
+    x: Array, P: Array, control: Array, cov_pose: Array, wheelbase: float, dt: float
+) -> dict[str, Array]:
+    found = _predict(x, P, control, np.zeros((2, 2)), wheelbase, dt)
+    found["P"][:3, :3] += cov_pose
+    return found
+
+
+def _gate(x: Array, P: Array, id: int, z: Array, cov_z: Array) -> Array:
+    at = slice(3 + 2 * int(id), 5 + 2 * int(id))
+    seen = observation.vehicle_from_world_with_jacobians(x[:3], x[at])
+    H = np.zeros((2, len(x)))
+    H[:, :3], H[:, at] = seen.J_pose, seen.J_landmark
+    return gate(z - seen.value, H @ P @ H.T + cov_z)
+
+
+def _yaw_rate(x: Array, control: Array, dt: float) -> Array:
+    ahead, turn, _ = vehicle.differential_increment(control, np.zeros((2, 2)), dt)
+    return vehicle.propagate(x, [ahead, turn])
+
+
+def _arc(x: Array, control: Array, dt: float) -> Array:
+    return se2.compose(x, se2.exp([control[0] * dt, 0.0, control[1] * dt]))
 
 
 def _from_polar(polar: Array, sigma_range: float, sigma_bearing: float) -> dict[str, Array]:
@@ -140,7 +168,12 @@ TABLE: Answers = {
         x, vehicle.ackermann(control, wheelbase, dt)
     ),
     "vehicle.front_wheel": lambda x, **drive: vehicle.front_wheel_step(x, **drive),
+    "vehicle.yaw_rate": _yaw_rate,
+    "vehicle.velocity_arc": _arc,
     "ekf.predict": _predict,
+    "ekf.predict_additive": _predict_additive,
+    "ekf.gate": _gate,
+    "range_bearing.update": lambda **inputs: update_polar(**inputs)._asdict(),
     "ekf.update": lambda x, P, **seen: _updated(_slam(x, P), **seen),
     # no landmark of the map has the number that is added
     "ekf.augment": lambda x, P, **seen: _updated(_slam(x, P), [len(x)], **seen),

@@ -76,6 +76,8 @@ def _p3p(bearings: Array, X_world: Array) -> Array:
 
 def _umeyama(source: Array, target: Array, with_scale: bool) -> dict[str, Any]:
     found = align(source, target, with_scale=bool(with_scale))
+    if not found.unique:
+        raise ValueError(found.reason)
     return {"scale": found.scale, "R": found.R_target_source, "t": found.t_target_source}
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.conformance.adapters.table import Answers
 from vslam_ref.estimation.least_squares import Options, minimise
-from vslam_ref.estimation.least_squares.damping import DampingState, gain_factor
+from vslam_ref.estimation.least_squares.damping import DampingState, Nielsen, gain_factor
 from vslam_ref.estimation.least_squares.linear import covariance, damped_step
 
 Array = NDArray[Any]
@@ -49,6 +49,38 @@ class Listed:
         return self.success(state, 0.0)
 
 
+class FromGiven(Nielsen):
+    """Nielsen's rule from a lambda that is given, in the metric of the identity."""
+
+    def scale(self, lengths: Array, before: Array | None) -> Array:
+        """Ones."""
+        return np.ones(len(lengths))
+
+    def first(self, stiffness: float) -> DampingState:
+        """The given one."""
+        return DampingState(self.tau, 2.0)
+
+
+def _nielsen_trace(y: Array, t: Array, start: Array, damping: float, count: int) -> list[dict[str, Any]]:
+    """The history of one run."""
+    options = Options(0.0, 0.0, 0.0, int(count), FromGiven(damping), least_gain=0.0)
+    found = minimise(
+        lambda b: b[0] * np.exp(-b[1] * t) - y, start, with_jacobian=_model(y, t), options=options
+    )
+    return [
+        {"cost": row.cost, "gain": row.gain, "damping": row.damping, "taken": int(row.accepted)}
+        for row in found.history
+    ]
+
+
+def _model(y: Array, t: Array) -> Any:
+    """Residual and Jacobian of a decay."""
+    return lambda b: (
+        b[0] * np.exp(-b[1] * t) - y,
+        np.stack([np.exp(-b[1] * t), -b[0] * t * np.exp(-b[1] * t)], 1),
+    )
+
+
 def _trace(y: Array, t: Array, start: Array, damping: Array) -> list[dict[str, Any]]:
     """The solver, ended after one step, two steps, and so on: what it has by then."""
     steps = []
@@ -57,10 +89,7 @@ def _trace(y: Array, t: Array, start: Array, damping: Array) -> list[dict[str, A
         found = minimise(
             lambda b: b[0] * np.exp(-b[1] * t) - y,
             start,
-            with_jacobian=lambda b: (
-                b[0] * np.exp(-b[1] * t) - y,
-                np.stack([np.exp(-b[1] * t), -b[0] * t * np.exp(-b[1] * t)], 1),
-            ),
+            with_jacobian=_model(y, t),
             options=options,
         )
         steps.append({"b": found.x, "cost": found.cost, "taken": int(found.history[-1].accepted)})
@@ -78,6 +107,7 @@ TABLE: Answers = {
     "least_squares.gauss_newton_step": lambda J, r: _step(J, r),
     "least_squares.lm_step": _step,
     "least_squares.lm_trace": _trace,
+    "least_squares.nielsen_trace": _nielsen_trace,
     "least_squares.covariance": _covariance,
     "least_squares.nielsen_factor": lambda gain: gain_factor(gain),
 }

@@ -270,6 +270,7 @@ function ekfPredict({ x, P, control: [v, steering], cov_u, wheelbase, dt }) {
 }
 
 function ekfUpdate({ x, P, ids, z, cov_z }) {
+  if (!ids.length) return { x, P };
   const [c, s] = [Math.cos(x[2]), Math.sin(x[2])];
   const H = zeros(2 * ids.length, x.length);
   const noise = zeros(2 * ids.length, 2 * ids.length);
