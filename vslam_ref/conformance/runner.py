@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Literal, NamedTuple
 
 from vslam_ref.conformance.catalogue import functions
-from vslam_ref.conformance.compare import Difference, Profile, compare
+from vslam_ref.conformance.compare import Difference, Profile, compare, refused
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.diagnose import diagnose, known_mistake
 from vslam_ref.conformance.program import Asked, Reply
@@ -155,7 +155,7 @@ def ask(asked: Asked, file: VectorFile, case: Case, convention: Convention, prof
         got = convention.outputs(function, _named(reply.value, list(function.outputs)), case.inputs)
     except (ValueError, TypeError, IndexError) as error:
         return Outcome(file, case, "error", None, f"garbage: {error}")
-    difference = judge(case, got) if case.statistic is not None else compare(case, got, profile)
+    difference = judge(case, got, profile) if case.statistic is not None else compare(case, got, profile)
     if difference.right:
         return Outcome(file, case, "passed", None, "")
     cause = diagnose(file, case, got, profile)
@@ -180,7 +180,7 @@ def _refused(file: VectorFile, case: Case, reply: Reply, convention: Convention,
         return Outcome(file, case, "passed", None, "")
     if reply.what != "value":
         return Outcome(file, case, "error", None, f"{reply.what}: {reply.message}")
-    wrong = Difference(False, "an answer", reply.value, "a refusal", float("inf"), 0.0)
+    wrong = refused("an answer", reply.value, "a refusal")
     cause = ""
     with contextlib.suppress(ValueError, TypeError, IndexError):
         function = functions()[case.function]

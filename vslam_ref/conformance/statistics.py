@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.conformance.compare import RIGHT, Difference, numbers
+from vslam_ref.conformance.compare import RIGHT, Difference, Profile, numbers, refused
 from vslam_ref.conformance.vectors_format import Case
 
 
@@ -52,36 +52,39 @@ MEASURES: dict[str, Callable[[Array], float]] = {
 }
 
 
-def judge(case: Case, got: dict[str, Any]) -> Difference:
+def judge(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Difference:
     """Measure a random answer, and compare with the band.
 
     Parameters
     ----------
     case : Case
-        ``statistic`` has ``output``, ``measure``, ``samples``, ``low``, ``high``, ``false_alarm``.
+        ``statistic`` has ``output``, ``measure``, ``samples``, ``low``, ``high``, ``false_alarm``;
+        where the measure is a rounding, ``float32`` has ``low`` and ``high`` of single precision.
     got : dict
         Outputs.
+    profile : {"float64", "float32"}
     """
     rule = case.statistic or {}
     name = str(rule["output"])
     if name not in got:
-        return Difference(False, name, None, "samples", float("inf"), 0.0)
+        return refused(name, None, "samples")
     try:
         samples = numbers(got[name])
     except ValueError as error:
-        return Difference(False, f"{name}: {error}", None, "samples", float("inf"), 0.0)
+        return refused(f"{name}: {error}", None, "samples")
     if len(np.atleast_1d(samples)) != rule["samples"] or not np.isfinite(samples).all():
         what = f"{name}: {len(np.atleast_1d(samples))} finite samples, expected {rule['samples']}"
-        return Difference(False, what, None, None, float("inf"), 0.0)
+        return refused(what, None, None)
     try:
         value = MEASURES[str(rule["measure"])](samples)
     except (ValueError, IndexError) as error:
-        return Difference(False, f"{name}: {error}", list(samples.shape), None, float("inf"), 0.0)
-    low, high = float(rule["low"]), float(rule["high"])
+        return refused(f"{name}: {error}", list(samples.shape), None)
+    band = rule.get("float32", rule) if profile == "float32" else rule
+    low, high = float(band["low"]), float(band["high"])
     if low <= value <= high:
         return RIGHT
     what = f"{rule['measure']} of {name} (a right program fails with probability {rule['false_alarm']:g})"
-    return Difference(False, what, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
+    return Difference("failed", what, value, [low, high], min(abs(value - low), abs(value - high)), 0.0)
 
 
 def mistaken(case: Case, got: dict[str, Any]) -> str:

@@ -56,7 +56,8 @@ class Case(NamedTuple):
         ``valid``, ``invalid`` (the program must refuse) or ``convention``.
     tolerance : dict
         ``relative`` (to the largest entry of an output) and ``absolute``, ``reason``; in ``float32`` the same
-        for single precision.
+        for single precision.  Where digits may be lost without being wrong, ``lost_digits``: see
+        :mod:`.compare`.
     statistic : dict or None
         How a random answer is judged.
     topic : str
@@ -165,3 +166,7 @@ def lint(file: VectorFile) -> Iterator[str]:
                 yield f"{case.id}: note {note!r} is not explained"
         if not case.tolerance.get("reason"):
             yield f"{case.id}: the tolerance has no reason"
+        for rule in (case.tolerance, case.tolerance.get("float32", {})):
+            lost = rule.get("lost_digits")
+            if lost and (lost["relative"] < rule["relative"] or lost["absolute"] < rule["absolute"]):
+                yield f"{case.id}: lost_digits is narrower than the tolerance"

@@ -25,7 +25,13 @@ FORMAT = 1
 
 
 def tolerance(
-    relative: float, reason: str, *, absolute: float = 0.0, float32: float | None = None
+    relative: float,
+    reason: str,
+    *,
+    absolute: float = 0.0,
+    float32: float | None = None,
+    lost: dict[str, Any] | None = None,
+    lost32: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Tolerance of a group.
 
@@ -40,13 +46,23 @@ def tolerance(
     float32 : float, optional
         The relative one in single precision; by default 2^29 times the double one, the ratio of the epsilons,
         at most 0.01.
+    lost, lost32 : dict, optional
+        Of :func:`lost_digits`, in double and in single precision.
     """
     ratio = 2.0**29
-    single = {
+    single: dict[str, Any] = {
         "relative": min(0.01, relative * ratio) if float32 is None else float32,
         "absolute": absolute * ratio,
     }
-    return {"relative": relative, "absolute": absolute, "reason": reason, "float32": single}
+    if lost32 is not None:
+        single["lost_digits"] = lost32
+    rule = {"relative": relative, "absolute": absolute, "reason": reason}
+    return {**rule, **({} if lost is None else {"lost_digits": lost}), "float32": single}
+
+
+def lost_digits(relative: float, reason: str, *, absolute: float = 0.0) -> dict[str, Any]:
+    """Width within which digits are lost and nothing is wrong: what the formula in the reason loses."""
+    return {"relative": relative, "absolute": absolute, "reason": reason}
 
 
 @dataclass
