@@ -34,23 +34,24 @@ CMD is split as a shell would; a path with spaces is quoted twice: --program "'/
 
 --module NAME: a Python module, or file.py, also in the folder you stand in. It has a function
   def answer(function, inputs):      # "so3.exp", {"phi": [0.1, 0.2, 0.3]} -> {"R": [[...], ...]}
-that returns lists or arrays, raises NotImplementedError where it has no such function ("unsupported"), and any
-other exception where it refuses the inputs ("error"). It runs in a process of its own: it may print, hang or
-crash.
+that returns lists or arrays, raises NotImplementedError where it has no such function ("unsupported"), and
+any other exception where it refuses the inputs ("error"). It runs in a process of its own: it may print, hang
+or crash.
 
 'vslam-ref vectors list' names the functions. What is unsupported is counted apart and is no failure.
---chapter, --topic, --function and --case add up: each adds its cases. A program with conventions of its own says
-so in a JSON file:
+--chapter, --topic, --function and --case add up: each adds its cases. A program with conventions of its own
+says so in a JSON file:
   {"transform": "world_from_cam", "perturbation": "right", "tangent_order": "rotation_first"}
 
-A program that is silent five times in a row is given up; Ctrl-C ends a run. In both cases the report, page and
-JSON have what was found until then.
+A program that is silent five times in a row is given up; Ctrl-C ends a run. In both cases page and JSON are
+written, with what was found until then.
 
 --nees judges a filter by its simulated runs, at least 10, each with the same steps: a CSV with the columns
 run, step, e1..ed, P11..Pdd (row by row), or an .npz with the arrays run, step, error, covariance. Its
 --report is a page (.html) or the figure alone (.png, .svg).
 
-Status: 0 all answered cases pass, 1 some fail or were not asked (with --strict also: digits are lost), 2 bad use.
+Status: 0 all answered cases pass, 1 some fail or were not asked (with --strict also: digits are lost),
+2 bad use, 130 interrupted.
 
 examples, the first after 'vslam-ref sample adapter --out samples':
   vslam-ref verify --program "python samples/adapter/my_slam_adapter.py" \\
@@ -120,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
-    """A polite end from outside (as of ``timeout 60 vslam-ref ...``) is taken as Ctrl-C: the report is written."""
+    """Take a polite end from outside, as by ``timeout 60 vslam-ref ...``, for Ctrl-C: write the report."""
 
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt

@@ -1,8 +1,7 @@
-"""What ``vslam-ref verify`` prints: counts, the functions with failures, names, the first failure, what to do next."""
+"""What ``vslam-ref verify`` prints: counts, functions with failures, names, what to do next."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -51,12 +50,11 @@ def _regimes(report: Report) -> Iterator[str]:
     wrong = [row for row in found if row.passed < row.cases]
     chosen = found if len(found) <= FEW_ROWS else wrong[:MOST_ROWS]
     if chosen:
-        heads = ["function", "regime", "cases", "passed", "digits lost", "digits median", "worst", "name"]
-        yield table(
-            heads, [[*(cells := regime_cells(row))[:-1], _short(cells[-1], LONGEST_NAME)] for row in chosen]
-        )
+        heads = ["function", "regime", "cases", "passed", "digits lost", "digits", "worst", "what is wrong"]
+        cells = [regime_cells(row) for row in chosen]
+        yield table(heads, [[*row[:-1], _short(row[-1], LONGEST_NAME)] for row in cells])
     if len(found) > FEW_ROWS and len(wrong) > MOST_ROWS:
-        yield f"{len(wrong) - MOST_ROWS} rows more in which not all cases pass: --report or --json FILE has them"
+        yield f"{len(wrong) - MOST_ROWS} rows more with failures: --report or --json FILE has them"
     if len(found) > FEW_ROWS:
         yield from _right([row for row in found if row.passed == row.cases])
 
@@ -104,25 +102,28 @@ def _next(report: Report, again: str) -> Iterator[str]:
     lost = report.count("lost digits")
     if lost:
         yield (
-            f"digits lost: {lost} answers are right to fewer digits than a careful formula gives; no failure, "
-            "unless --strict"
+            f"digits lost: {lost} answers are right to fewer digits than a careful formula gives; no "
+            "failure, unless --strict"
         )
     first = report.first
     if first is not None:
-        functions = Counter(o.case.function for o in report.outcomes if o.bad)
-        yield f"not verified: failures in {len(functions)} function{'s' if len(functions) > 1 else ''}"
-        yield (
-            f"next: mend {first.case.function}, the most basic of them; functions that are built on it may fail "
-            "with it. Ask it alone:"
-        )
-        yield f"  {again} --function {first.case.function}"
+        count = len({o.case.function for o in report.outcomes if o.bad})
+        yield f"not verified: failures in {count} function{'s' if count > 1 else ''}"
+        if report.stopped.startswith("given up"):
+            yield "next: see why it gives no reply. Ask one case, which shows what the program prints:"
+        else:
+            yield (
+                f"next: mend {first.case.function}, the most basic of them; functions built on it may fail "
+                "with it. Ask it alone:"
+            )
+            yield f"  {again} --function {first.case.function}"
         yield f"  {again} --case {first.case.id}      # shows what the program prints"
     elif not any(o.status in ("passed", "lost digits") for o in report.outcomes):
         yield "nothing passed: a program that answers nothing is not verified"
         if report.count("unsupported"):
             yield (
-                "next: it calls everything unsupported; does it know the functions by their names, as so3.exp? "
-                "'vslam-ref vectors list' prints them"
+                "next: it calls everything unsupported; does it know the functions by their names, as "
+                "so3.exp? 'vslam-ref vectors list' prints them"
             )
     elif report.passed:
         yield "all answered cases pass"

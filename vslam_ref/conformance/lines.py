@@ -21,6 +21,8 @@ import threading
 from collections.abc import Sequence
 from typing import IO, Literal, NamedTuple
 
+from vslam_ref.conformance.replies import sentence
+
 LONGEST_LINE = 16 * 2**20
 LINES_WAITING = 8
 LAST_BYTES = 8000
@@ -101,10 +103,19 @@ class LineProcess:
         except queue.Empty:
             return Received("nothing", b"")
 
+    def forget(self) -> None:
+        """Forget what was written to standard error until now: it tells nothing of what comes."""
+        self._last.clear()
+
     @property
     def ended(self) -> bool:
         """Whether it has ended."""
         return self._process.poll() is not None
+
+    @property
+    def status(self) -> int | None:
+        """Its exit status, or None while it runs."""
+        return self._process.poll()
 
     def end(self) -> str:
         """End it by force if it has not ended; say how it ended, and its last words."""
@@ -161,15 +172,13 @@ def _status(code: int) -> str:
 
 
 def last_words(text: str) -> str:
-    """The line of an error's text that says most, with its place where Python tells one.
+    r"""The line of an error's text that says most, with its place where Python tells one.
 
     Examples
     --------
-    >>> last_words('  File "mine.py", line 3\\n    x = = 1\\nSyntaxError: invalid syntax\\n')
+    >>> last_words('  File "mine.py", line 3\n    x = = 1\nSyntaxError: invalid syntax\n')
     'SyntaxError: invalid syntax (mine.py, line 3)'
     """
-    from vslam_ref.conformance.replies import sentence
-
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         return ""

@@ -73,8 +73,7 @@ def _picture(function: str, outcomes: list[Outcome]) -> Picture | None:
             points.append((at, 10.0**-o.digits, o.status))
     if len(points) < FEWEST_POINTS:
         return None
-    at, errors, verdicts = (list(part) for part in zip(*points, strict=True))
-    return Picture(function, axis, at, errors, verdicts)
+    return Picture(function, axis, *(list(part) for part in zip(*points, strict=True)))
 
 
 def _number(function: str) -> tuple[str, Callable[[dict[str, Any]], float] | None]:

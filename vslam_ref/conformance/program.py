@@ -4,8 +4,8 @@
 * Reply: ``{"id": "…", "value": {"R": [[…], […], […]]}}``, or ``{"id": "…", "unsupported": true}``, or
   ``{"id": "…", "error": "…"}``.  A function with one output may reply with the bare value.
 
-A program that is silent, dies, prints rubbish or half a line gives a :class:`Reply` that says so.  A Python module
-is asked in a process of its own, by the same protocol (:class:`ModuleProgram`), or in this one
+A program that is silent, dies, prints rubbish or half a line gives a :class:`Reply` that says so.  A Python
+module is asked in a process of its own, by the same protocol (:class:`ModuleProgram`), or in this one
 (:class:`InProcess`), for modules that are trusted.
 """
 
@@ -16,13 +16,14 @@ import shlex
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from vslam_ref.conformance.hints import not_executable, unquoted
 from vslam_ref.conformance.lines import LineProcess, Received
 from vslam_ref.conformance.loading import load_module
 from vslam_ref.conformance.replies import (
+    TOO_DEEP,
     Asked,
     Reply,
     clean,
@@ -40,7 +41,8 @@ WAIT_AFTER_STRAY = 1.0
 """Seconds that a reply may take after a line that is none, until one came after such lines."""
 SECONDS_TO_IMPORT = 60.0
 
-CHILD = "import sys, json; sys.path[:] = json.loads(sys.argv[1])\n" + (
+CHILD = (
+    "import sys; sys.path[:] = sys.argv[1].split(chr(10))\n"  # what stands in the folder shadows nothing
     "from vslam_ref.conformance.serve import child; sys.exit(child(sys.argv[2]))"
 )
 
@@ -49,6 +51,7 @@ class InProcess:
     """A module with ``answer(function, inputs)``; NotImplementedError is "unsupported", others are errors."""
 
     notes: tuple[str, ...] = ()
+    alive = True
 
     def __init__(self, module: ModuleType | str) -> None:
         if isinstance(module, str):
@@ -75,7 +78,7 @@ class InProcess:
         try:
             return Reply("value", clean(value), "")
         except (ValueError, RecursionError) as error:
-            return Reply("garbage", None, f"the value has {sentence(error)}")
+            return Reply("garbage", None, f"the value: {sentence(error)}")
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -110,16 +113,12 @@ class Program:
         try:
             self._start()
         except OSError as error:
-            hint = unquoted(command, words) or _not_executable(error, words[0])
+            hint = unquoted(command, words) or not_executable(error, words[0])
             raise ValueError(f"--program {command!r}: {error.strerror}: {words[0]}{hint}") from None
 
     def _prepare(self, name: str, words: list[str], timeout: float, show_errors: bool) -> None:
-        self.name, self.words, self.timeout, self.show_errors = (
-            sentence(name, 1000),
-            words,
-            timeout,
-            show_errors,
-        )
+        self.name, self.words, self.timeout = sentence(name, 1000), words, timeout
+        self.show_errors = show_errors
         self.starts, self._seconds_to_start = 0, 0.0
         self._known = False  # it has replied, now or before it was started again
         self._stray, self._first_stray, self._late = 0, "", 0
@@ -141,9 +140,19 @@ class Program:
             if self._process.ended:
                 self._process.kill()  # what it started may live
                 self._start()
-            sent = self._process.send(line.encode() + b"\n", self.timeout)
+            before = self._replied
+            reply = self._once(identity, line.encode() + b"\n")
+            if (
+                reply.what == "crash" and before and self._process.status == 0
+            ):  # it ended after its last reply
+                self._start()
+                reply = self._once(identity, line.encode() + b"\n")
         except (OSError, ValueError) as error:
             return Reply("crash", None, f"the program cannot be started again: {raised(error)}", True)
+        return reply
+
+    def _once(self, identity: str, line: bytes) -> Reply:
+        sent = self._process.send(line, self.timeout)
         if sent == "closed":
             return self._died("")
         if sent == "stuck":
@@ -173,6 +182,9 @@ class Program:
                 self._late, self._before_late = self._late + 1, ""
                 end = time.monotonic() + self.timeout
                 continue
+            if content is None and got.kind != "half" and identity.encode() in got.raw[:1000]:
+                self._has_replied(stray, first)
+                return Reply("garbage", None, why)
             stray, first = stray + 1, first or why
             if stray == 1 and not self._stray:
                 end = min(end, time.monotonic() + WAIT_AFTER_STRAY)
@@ -183,13 +195,14 @@ class Program:
         if not self._known:
             self._seconds_to_start = time.monotonic() - self._began
         self._replied = self._known = True
+        self._process.forget()
         self._stray, self._first_stray = self._stray + stray, self._first_stray or first
 
     def _silent(self, identity: str, first: str) -> Reply:
         """No reply in time.
 
-        A program that has replied before hangs, and is stopped; so is one that was started again.  The first time
-        a program may just start slowly: it is stopped when it is silent twice.
+        A program that has replied before hangs, and is stopped; so is one that was started again.  The first
+        time a program may just start slowly: it is stopped when it is silent twice.
         """
         self._timed_out.add(identity)
         if first:
@@ -209,20 +222,23 @@ class Program:
         return Reply(what, None, f"{message}{hint}", True)
 
     @property
+    def alive(self) -> bool:
+        """Whether it has replied, or was imported."""
+        return self._known
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What was odd and did no harm."""
         told = []
         if self._stray:
             told.append(
-                f"{self._stray} lines on standard output were no replies and were passed over, the first "
-                f"{self._first_stray}; standard error is free for messages"
+                f"lines on standard output that are no replies, passed over: {self._stray}, the first "
+                f"{self._first_stray}; messages may go to standard error"
             )
         if self._late:
-            told.append(f"{self._late} replies came too late (--timeout {self.timeout:g})")
+            told.append(f"replies that came too late: {self._late} (--timeout {self.timeout:g})")
         if self.starts > 1:
-            told.append(
-                f"the program was started {self.starts} times: it ended, or was silent and was stopped"
-            )
+            told.append(f"the program was started {self.starts} times: it ended, or hung and was stopped")
         return tuple(told)
 
     def close(self) -> None:
@@ -240,7 +256,7 @@ class ModuleProgram(Program):
     """
 
     def __init__(self, module: str, timeout: float = 10.0, *, show_errors: bool = False) -> None:
-        words = [sys.executable, "-X", "faulthandler", "-c", CHILD, json.dumps(sys.path), module]
+        words = [sys.executable, "-X", "faulthandler", "-c", CHILD, "\n".join(sys.path), module]
         self._prepare(module, words, timeout, show_errors)
         try:
             self._start()
@@ -263,6 +279,7 @@ class ModuleProgram(Program):
         if "refused" in content:
             raise ValueError(content["refused"])
         self._replied = self._known = True
+        self._process.forget()
 
 
 def _object(got: Received, identity: str) -> tuple[dict[str, Any] | None, str]:
@@ -272,31 +289,11 @@ def _object(got: Received, identity: str) -> tuple[dict[str, Any] | None, str]:
         return None, f"{words}: {shown_bytes(got.raw)}"
     try:
         content = parse(got.raw)
-    except ValueError:
-        return None, f"not JSON: {shown_bytes(got.raw)}"
+    except ValueError as error:
+        deep = str(error) == TOO_DEEP
+        return None, f"{TOO_DEEP if deep else 'not JSON'}: {shown_bytes(got.raw)}"
     if not isinstance(content, dict):
         return None, f"not an object: {shown_bytes(got.raw)}"
     if not isinstance(content.get("id"), str):
         return {}, f"a reply without the id {identity!r} of its question: {shown_bytes(got.raw)}"
     return content, f"a reply with another id than {identity!r}: {shown_bytes(got.raw)}"
-
-
-def unquoted(command: str, words: list[str]) -> str:
-    """A hint where two words together are the path of a file: a path with spaces must be quoted."""
-    for first in range(len(words)):
-        for last in range(len(words), first + 1, -1):
-            path = " ".join(words[first:last])
-            if Path(path).is_file() and path in command:
-                quoted = [*words[:first], shlex.quote(path), *words[last:]]
-                return f'; a path with spaces is quoted twice: --program "{" ".join(quoted)}"'
-    return ""
-
-
-def _not_executable(error: OSError, word: str) -> str:
-    """A hint where a file is there and is not a program."""
-    if not Path(word).is_file():
-        return ""
-    python = f"python {word}" if word.endswith(".py") else f"INTERPRETER {word}"
-    return (
-        f'; make it executable (chmod +x) with a first line such as #!/usr/bin/env python3, or say "{python}"'
-    )

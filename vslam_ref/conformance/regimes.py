@@ -1,4 +1,4 @@
-"""Functions and regimes: the order from basic to built upon, the plainest case, and a table of what became of them.
+"""Functions and regimes: the order from basic to built upon, the plainest case, what became of them.
 
 A *regime* is what stands between the function's name and the number in a case's id: ``near_pi`` in
 ``so3.exp/near_pi-03``.

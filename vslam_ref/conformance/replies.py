@@ -5,8 +5,8 @@
     line of bytes ---- parse ----> JSON ---- clean ----> a value that can be compared, shown and written
     Python object ------------------------- clean ---->
 
-A number with hundreds of digits becomes infinite, half of a surrogate pair becomes the text of its code, and what
-is nested deeper than any answer is refused.
+A number with hundreds of digits becomes infinite, half of a surrogate pair becomes the text of its code, and
+what is nested deeper than any answer is refused.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 DEEPEST = 32
 LONGEST_INTEGER = 300
 LONGEST_SENTENCE = 300
+TOO_DEEP = "lists in lists, too deep"
 
 What = Literal["value", "unsupported", "error", "timeout", "crash", "garbage"]
 
@@ -44,6 +45,10 @@ class Asked(Protocol):
         """Let go."""
 
     @property
+    def alive(self) -> bool:
+        """Whether it is known to work: it has replied, or it was imported."""
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What was odd and did no harm."""
 
@@ -53,7 +58,7 @@ def parse(raw: bytes) -> Any:
     try:
         return json.loads(raw, parse_int=_whole)
     except RecursionError:
-        raise ValueError("nested too deep") from None
+        raise ValueError(TOO_DEEP) from None
 
 
 def _whole(text: str) -> int | float:
@@ -62,7 +67,7 @@ def _whole(text: str) -> int | float:
 
 
 def clean(value: Any, depth: int = 0) -> Any:
-    """Return a value in lists, objects, texts and numbers that are safe to handle.
+    r"""Return a value in lists, objects, texts and numbers that are safe to handle.
 
     Raises
     ------
@@ -71,8 +76,8 @@ def clean(value: Any, depth: int = 0) -> Any:
 
     Examples
     --------
-    >>> clean((1, 10**400, "a\\ud800"))
-    [1, inf, 'a\\\\ud800']
+    >>> clean((1, 10**400, "a\ud800"))
+    [1, inf, 'a\\ud800']
     """
     if depth > DEEPEST:
         raise ValueError(f"lists in lists, more than {DEEPEST} deep")
@@ -81,7 +86,8 @@ def clean(value: Any, depth: int = 0) -> Any:
     if isinstance(value, float):
         return float(value)
     if isinstance(value, int):
-        return int(value) if abs(value) < 10**LONGEST_INTEGER else math.copysign(math.inf, value)
+        small = abs(value) < 10**LONGEST_INTEGER
+        return int(value) if small else math.inf if value > 0 else -math.inf
     if isinstance(value, str):
         return value.encode("utf-8", "backslashreplace").decode()
     if isinstance(value, Mapping):
@@ -90,14 +96,14 @@ def clean(value: Any, depth: int = 0) -> Any:
         return [clean(inner, depth + 1) for inner in value]
     if hasattr(value, "tolist"):  # arrays and their numbers, of NumPy and others
         return clean(value.tolist(), depth + 1)
-    raise ValueError(f"{type(value).__name__} is no number, text, list or object")
+    raise ValueError(f"a {type(value).__name__} is no number, text, list or object")
 
 
 def sentence(text: Any, most: int = LONGEST_SENTENCE) -> str:
-    """Return any text as part of a line: one row, printable, not too long.
+    r"""Return any text as part of a line: one row, printable, not too long.
 
-    >>> sentence("two\\nrows and a bell \\a")
-    'two rows and a bell \\\\x07'
+    >>> sentence("two\nrows and a bell \a")
+    'two rows and a bell \\x07'
     """
     try:
         words = " ".join(str(text)[: 4 * most].split())
@@ -132,4 +138,4 @@ def read_reply(content: dict[str, Any], raw: bytes) -> Reply:
     try:
         return Reply("value", clean(content["value"]), "")
     except ValueError as error:
-        return Reply("garbage", None, f"the value has {error}")
+        return Reply("garbage", None, f"the value: {error}")

@@ -1,4 +1,4 @@
-"""A page with everything the runner found: what to look at first, functions and regimes, names, every failure."""
+"""A page with everything the runner found: what to look at first, functions and regimes, names, failures."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ def verification_page(report: Report) -> str:
 def _verdict(report: Report) -> Html:
     word = "all answered cases pass" if report.passed else "not verified"
     counts = (
-        f": {report.count('passed')} passed, {report.count('failed')} failed, {report.count('error')} without a "
-        f"usable reply, {report.count('lost digits')} lost digits, {report.count('unsupported')} not supported."
+        f": {report.count('passed')} passed, {report.count('failed')} failed, {report.count('error')} "
+        f"without a usable reply, {report.count('lost digits')} lost digits, {report.count('unsupported')} not "
+        "supported."
     )
     said = [tag("p", tag("strong", word), counts, class_="good" if report.passed else "bad")]
     if report.not_asked:
@@ -49,8 +50,8 @@ def _first(report: Report) -> Html | None:
     if first is None:
         return None
     words = (
-        "The plainest failure of the most basic function that fails. Functions that are built on it may fail with "
-        "it: mend this one, then run again."
+        "The plainest failure of the most basic function that fails. Functions that are built on it may fail "
+        "with it: mend this one, then run again."
     )
     return Html(tag("h2", "Look here first") + tag("p", words) + _block(report, first, is_open=True))
 
@@ -85,8 +86,8 @@ def _functions(report: Report) -> Html | None:
     wrong = [row for row in found if row.passed < row.cases]
     right = [row for row in found if row.passed == row.cases]
     words = (
-        "A regime is a kind of inputs, as near_pi. Digits are right decimal digits, 16 at most, of answers with "
-        "numbers."
+        "A regime is a kind of inputs, as near_pi. Digits: how many decimal digits are right, at most 16, in "
+        "the median and in the worst answer with numbers."
     )
     parts = [tag("h2", "Functions and regimes"), tag("p", words)]
     if wrong:
@@ -127,8 +128,8 @@ def _pictures(report: Report) -> Html | None:
     shown = found[:MOST_PICTURES]
     cut = f" The first {len(shown)} of {len(found)} functions." if len(found) > len(shown) else ""
     words = (
-        "Relative errors of the answers. A step where a branch begins, a slope where digits cancel, or one level "
-        "everywhere each tell another story."
+        "Relative errors of the answers. A step where a branch begins, a slope where digits cancel, or one "
+        "level everywhere each tell another story."
     )
     parts = [tag("h3", tag("code", p.function)) + _drawn(p) for p in shown]
     return Html(tag("h2", "Errors over the inputs") + tag("p", words + cut) + "".join(parts))

@@ -177,7 +177,7 @@ class Report(NamedTuple):
             "expected": o.case.expected if o.case.result != "invalid" else "a refusal",
             "answered": bounded(o.answer) if o.answer is not None else o.cause,
             "error": d.size if d else None,
-            "allowed": d.allowed if d else None,
+            "allowed": d.allowed if d and math.isfinite(d.size) else None,
             "name": self.name(o),
         }
 

@@ -63,7 +63,7 @@ def run(
             outcomes.append(outcome)
             if progress is not None:
                 progress(outcome)
-            if stopped := patience.judge(case.function, reply):
+            if stopped := patience.judge(case.function, reply, asked.alive):
                 break
         if not stopped:
             named, notes = _named_functions(outcomes, _asking(asked, declared))

@@ -3,11 +3,11 @@
     python -m vslam_ref.conformance.serve my_package.adapter      # or my_adapter.py
 
 This is the example of the protocol in Python.  Nothing but replies may go to standard output; what the module
-prints, in Python or below it, is sent to standard error.  Blank lines are skipped; a line that is not a request is
-answered with an error, without an id.
+prints, in Python or below it, goes to standard error.  Blank lines are skipped; a line that is not a request
+is answered with an error, without an id.
 
-``vslam-ref verify --module`` runs the same in a child process (:func:`child`), which first says whether the module
-could be imported.
+``vslam-ref verify --module`` runs the same in a child process (:func:`child`), which first says whether the
+module could be imported.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def reply(answer: Answer, line: str) -> dict[str, Any]:
     try:
         return {"id": identity, "value": clean(value)}
     except (ValueError, RecursionError) as error:
-        return {"id": identity, "unusable": f"the value has {sentence(error)}"}
+        return {"id": identity, "unusable": f"the value: {sentence(error)}"}
 
 
 def serve(answer: Answer, requests: Iterable[str], out: TextIO) -> None:
