@@ -27,7 +27,7 @@ def load_module(name: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name is not None and (name == error.name or name.startswith(f"{error.name}.")):
             raise ImportError(
-                f"no such module is installed or stands in {Path.cwd()}; expected a module or file.py"
+                f"No module named {name!r} is installed or stands in {Path.cwd()}; a file ends in .py"
             ) from None
         raise ImportError(_told(error)) from None
     except (Exception, SystemExit) as error:  # whatever a user's module does

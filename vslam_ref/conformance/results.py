@@ -10,6 +10,8 @@ from vslam_ref.conformance.compare import Difference
 from vslam_ref.conformance.vectors_format import Case, VectorFile
 
 Status = Literal["passed", "lost digits", "failed", "unsupported", "error"]
+NOTHING = "nothing that is known fits"
+"""What is said of a function whose failures have no name."""
 KEYS: dict[Status, str] = {
     "passed": "passed",
     "failed": "failed",
@@ -36,7 +38,7 @@ class Outcome(NamedTuple):
         other convention it was.
     digits : float
         Right digits of an answer with numbers, of passed cases, too; NaN where there are none.
-    answer : dict or None
+    got : dict or None
         What was compared: the outputs by name, in the house's convention.
     """
 
@@ -46,7 +48,7 @@ class Outcome(NamedTuple):
     difference: Difference | None
     cause: str
     digits: float = math.nan
-    answer: dict[str, Any] | None = None
+    got: dict[str, Any] | None = None
 
     @property
     def bad(self) -> bool:
@@ -104,14 +106,15 @@ class Report(NamedTuple):
     @property
     def unexplained(self) -> dict[str, int]:
         """Failures without a name, by function."""
-        those = [o for o in self.outcomes if o.status == "failed" and not self.name(o)]
+        those = [o for o in self.outcomes if o.status == "failed" and self.name(o) in ("", NOTHING)]
         return dict(Counter(o.case.function for o in those).most_common())
 
     def name(self, outcome: Outcome) -> str:
         """What is wrong in a failed case: the name of its function's mistake, or the case's own cause."""
         if outcome.status not in ("failed", "lost digits"):
             return ""
-        return self.functions_named.get(outcome.case.function, "") or outcome.cause
+        whole = self.functions_named.get(outcome.case.function, "")
+        return whole if whole not in ("", NOTHING) else outcome.cause or whole
 
     def numbers(self) -> dict[str, Any]:
         """The content of ``--json``."""
@@ -175,7 +178,7 @@ class Report(NamedTuple):
             "function": o.case.function,
             "regime": regime(o.case),
             "expected": o.case.expected if o.case.result != "invalid" else "a refusal",
-            "answered": bounded(o.answer) if o.answer is not None else o.cause,
+            "answered": bounded(o.got) if o.got is not None else o.cause,
             "error": d.size if d else None,
             "allowed": d.allowed if d and math.isfinite(d.size) else None,
             "name": self.name(o),

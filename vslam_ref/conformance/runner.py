@@ -23,6 +23,7 @@ from vslam_ref.conformance.vectors_format import Case, VectorFile
 __all__ = ["Outcome", "Report", "Status", "ask", "run"]
 
 INTERRUPTED = "interrupted"
+MOST_LOST_AGAIN = 2
 
 
 def run(
@@ -66,7 +67,7 @@ def run(
             if stopped := patience.judge(case.function, reply, asked.alive):
                 break
         if not stopped:
-            named, notes = _named_functions(outcomes, _asking(asked, declared))
+            named, notes = _named_functions(outcomes, _asking(asked, declared), profile)
     except KeyboardInterrupt:
         stopped = INTERRUPTED
     return Report(
@@ -102,7 +103,8 @@ def _judged(file: VectorFile, case: Case, reply: Reply, convention: Convention, 
     try:
         if case.result == "invalid":
             return _refused(file, case, reply, convention, profile)
-        return _compared(file, case, _outputs(reply.value, case, convention), profile)
+        got = _outputs(reply.value, functions()[case.function], case.inputs, convention)
+        return _compared(file, case, got, profile)
     except (ValueError, TypeError, IndexError, ArithmeticError, RecursionError) as error:
         return Outcome(file, case, "error", None, f"garbage: {raised(error)}")
 
@@ -126,11 +128,12 @@ def _cause(file: VectorFile, case: Case, got: dict[str, Any], profile: Profile) 
     return ""
 
 
-def _outputs(value: Any, case: Case, convention: Convention) -> dict[str, Any]:
+def _outputs(
+    value: Any, function: Function, inputs: dict[str, Any], convention: Convention
+) -> dict[str, Any]:
     """Outputs by name, in the house's convention."""
-    function = functions()[case.function]
     try:
-        return convention.outputs(function, _by_name(value, function), case.inputs)
+        return convention.outputs(function, _by_name(value, function), inputs)
     except OverflowError as error:
         raise ValueError(str(error)) from None
 
@@ -161,21 +164,31 @@ def _refused(file: VectorFile, case: Case, reply: Reply, convention: Convention,
     wrong = refused("an answer", reply.value, "a refusal")
     cause, got = "", {"value": reply.value}
     with contextlib.suppress(ValueError, TypeError, IndexError, ArithmeticError):
-        got = _outputs(reply.value, case, convention)
+        got = _outputs(reply.value, functions()[case.function], case.inputs, convention)
         cause = known_mistake(file, case, got, profile)
     cause = cause or "there is no answer; the program gives one"
-    return Outcome(file, case, "failed", wrong, cause, answer=got)
+    return Outcome(file, case, "failed", wrong, cause, got=got)
 
 
-def _asking(asked: Asked, convention: Convention) -> Callable[[Case], dict[str, Any] | None]:
-    """A function that asks the program once more, a case with other inputs; None where no value comes."""
+Again = Callable[[str, dict[str, Any]], dict[str, Any] | None]
 
-    def once_more(case: Case) -> dict[str, Any] | None:
-        reply = asked.ask(case.id, case.function, convention.inputs(functions()[case.function], case.inputs))
-        if reply.what != "value":
+
+def _asking(asked: Asked, convention: Convention) -> Again:
+    """A function that asks the program once more, with other inputs; None where no value comes.
+
+    A program that gives no reply twice in a row is not asked any more.
+    """
+    lost = 0
+
+    def once_more(name: str, inputs: dict[str, Any]) -> dict[str, Any] | None:
+        nonlocal lost
+        if lost >= MOST_LOST_AGAIN:
             return None
-        with contextlib.suppress(ValueError, TypeError, IndexError, ArithmeticError):
-            return _outputs(reply.value, case, convention)
+        function = functions()[name]
+        with contextlib.suppress(ValueError, TypeError, KeyError, IndexError, ArithmeticError):
+            reply = asked.ask(f"{name}/again", name, convention.inputs(function, inputs))
+            lost = lost + 1 if reply.silent else 0
+            return _outputs(reply.value, function, inputs, convention) if reply.what == "value" else None
         return None
 
     return once_more
@@ -190,13 +203,13 @@ def _namer() -> Callable[..., dict[str, str]] | None:
 
 
 def _named_functions(
-    outcomes: list[Outcome], once_more: Callable[[Case], dict[str, Any] | None]
+    outcomes: list[Outcome], once_more: Again, profile: Profile
 ) -> tuple[dict[str, str], list[str]]:
     """Function -> what is wrong with it; names are a help, and their failure must not lose the report."""
     namer = _namer()
     if namer is None:
         return {}, []
     try:
-        return namer(outcomes, once_more), []
+        return namer(outcomes, once_more, profile), []
     except Exception as error:
         return {}, [f"no names of whole functions: {raised(error)}"]
