@@ -7,7 +7,6 @@ A *regime* is what stands between the function's name and the number in a case's
 from __future__ import annotations
 
 import functools
-import json
 import math
 import statistics as stats
 from collections.abc import Iterable
@@ -75,14 +74,9 @@ def place(function: str) -> tuple[float, int]:
     return _places().get(function, (math.inf, 0))
 
 
-def plainness(case: Case) -> tuple[bool, int, bool, int]:
-    """Order of cases from plain to special: few numbers, generic, short numbers; refusals last."""
-    return (
-        case.result == "invalid",
-        _count(case.inputs),
-        regime(case).partition("-")[0] != "generic",
-        len(json.dumps(case.inputs)),
-    )
+def plainness(case: Case) -> tuple[bool, int, bool]:
+    """Order of cases from plain to special: few numbers, generic; refusals last."""
+    return case.result == "invalid", _count(case.inputs), regime(case).partition("-")[0] != "generic"
 
 
 def _count(value: Any) -> int:
@@ -93,8 +87,17 @@ def _count(value: Any) -> int:
 
 
 def basic_first(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Outcomes in the order in which one should look at them: basic functions first, plain cases first."""
-    return sorted(outcomes, key=lambda o: (place(o.case.function), plainness(o.case)))
+    """Outcomes in the order in which one should look at them: basic functions, plain cases, large errors first."""
+
+    def key(o: Outcome) -> tuple[Any, ...]:
+        return (
+            place(o.case.function),
+            *plainness(o.case),
+            0.0 if math.isnan(o.digits) else o.digits,
+            o.case.id,
+        )
+
+    return sorted(outcomes, key=key)
 
 
 def rows(outcomes: Iterable[Outcome], named: dict[str, str]) -> list[RegimeRow]:
