@@ -30,7 +30,7 @@ function adapter()
   end
 end
 
-% --- 1 your functions
+% ---------------------------------------------------------------- 1 your functions
 
 function R = so3_exp(phi)
 % Rotation matrix of a rotation vector: I + a hat(phi) + b hat(phi)^2.
@@ -44,7 +44,8 @@ function R = so3_exp(phi)
   R = eye(3) + a * W + b * W * W;
 end
 
-% --- 2 the table: 'vslam-ref vectors list' names all functions; vectors are columns here
+% ---------------------------------------------------------------- 2 the table
+% 'vslam-ref vectors list' names all functions.  Vectors are columns here.
 
 function [out, known] = value(name, in)
   known = true;
@@ -69,7 +70,7 @@ function [out, known] = value(name, in)
   end
 end
 
-% --- 3 between the two: keep this
+% ---------------------------------------------------------------- 3 between the two: keep it
 
 function said = reply(line)
   said = struct('id', '');
