@@ -32,7 +32,9 @@ def altered(change: dict[str, Any], *topics: str) -> Report:
 
     def answer(function: str, inputs: dict[str, Any]) -> Any:
         found = itself.answer(function, inputs)
-        return change[function](found, inputs) if function in change else found
+        outputs = functions()[function].outputs
+        named = found if isinstance(found, dict) else dict.fromkeys(outputs, found)
+        return change[function](named, inputs) if function in change else found
 
     module.answer = answer  # type: ignore[attr-defined]
     return run(InProcess(module), select(topics=topics))
@@ -75,9 +77,9 @@ def test_the_first_failure_is_the_most_basic_functions_in_its_plainest_case(wron
     assert first.case.function == "so3.exp"
     assert regime(first.case) == "generic"
     assert wrong.numbers()["first_failure"]["id"] == first.case.id
-    files = [file._replace(cases=file.cases[::-1]) for file in select(topics=["se3", "so3"])[::-1]]
+    files = [file._replace(cases=file.cases[::-1]) for file in select(functions=["se3.exp", "so3.exp"])[::-1]]
     module = ModuleType("transposed")
-    module.answer = lambda f, i: transposed(itself.answer(f, i), i)  # type: ignore[attr-defined]
+    module.answer = lambda f, i: np.transpose(itself.answer(f, i)).tolist()  # type: ignore[attr-defined]
     turned = run(InProcess(module), files).first
     assert turned is not None
     assert (turned.case.function, regime(turned.case)) == ("so3.exp", "generic")
@@ -118,7 +120,7 @@ def test_a_regime_that_is_off_is_the_only_row_with_failures() -> None:
     wrong_rows = [row for row in rows(report.outcomes, {}) if row.bad]
     assert [(row.function, row.regime) for row in wrong_rows] == [("so3.exp", "near_pi")]
     (row,) = wrong_rows
-    assert 5.9 < row.digits_worst <= row.digits_median < 6.1  # type: ignore[operator]
+    assert 5.8 < row.digits_worst <= row.digits_median < 6.1  # type: ignore[operator]
     right = next(r for r in rows(report.outcomes, {}) if (r.function, r.regime) == ("so3.exp", "generic"))
     assert right.digits_worst is not None
     assert right.digits_worst > 14
@@ -239,19 +241,15 @@ def test_pictures_are_of_functions_that_fail_and_show_where() -> None:
 
 
 def test_there_is_a_number_for_every_case_of_the_groups_that_can_fail() -> None:
-    for topic in ("so2", "se2", "so3", "se3", "sim3", "quaternion", "camera", "loss"):
+    for topic in ("so2", "se2", "so3", "se3", "sim3", "quaternion", "camera"):
         for file in select(topics=[topic]):
             for case in file.cases:
                 if case.function in ("so3.random", "camera.unproject", "camera.jacobian_ray"):
-                    continue
-                if case.function == "loss.cost" and isinstance(case.inputs["x"], list):
                     continue
                 if case.function.endswith("interpolate"):
                     value = angle_between(case.inputs)
                 elif topic == "camera":
                     value = off_axis(case.inputs)
-                elif topic == "loss":
-                    value = 0.0
                 else:
                     value = angle(case.inputs)
                 assert math.isnan(value) or value >= 0.0, case.id
@@ -290,13 +288,13 @@ def test_the_page_says_what_was_not_asked(wrong: Report) -> None:
 def test_the_page_is_of_bounded_size() -> None:
     """Everything fails, with long answers: the page is cut and says so, the JSON is not."""
     module = ModuleType("large")
-    module.answer = lambda function, inputs: [[1.0] * 20] * 20  # type: ignore[attr-defined]
+    module.answer = lambda function, inputs: "long " * 1000  # type: ignore[attr-defined]
     report = run(InProcess(module), select())
     bad = sum(o.bad for o in report.outcomes)
     assert bad > 2000
     shown = verification_page(report)
     assert f"{bad} in all. {page_module.MOST_FAILURES} are shown: --json has all." in shown
-    assert len(shown) < 3_000_000
+    assert len(shown) < 2_500_000
     assert len(report.numbers()["failures"]) == bad
     assert len(text(report, "")) < 30_000
 

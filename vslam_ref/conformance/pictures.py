@@ -5,7 +5,6 @@ functions             the number
 ====================  ==========================================================================
 of rotations, motions the angle of the rotation; of two (``interpolate``), the angle between them
 of cameras            the angle of the point from the optical axis
-of losses             the residual over the scale c
 ====================  ==========================================================================
 """
 
@@ -67,7 +66,7 @@ def _picture(function: str, outcomes: list[Outcome]) -> Picture | None:
     for o in outcomes:
         try:
             at = number(o.case.inputs)
-        except (KeyError, ValueError, IndexError):
+        except (KeyError, ValueError, IndexError, TypeError):
             continue  # a case without this number
         if np.isfinite(at):
             points.append((at, 10.0**-o.digits, o.status))
@@ -86,8 +85,6 @@ def _number(function: str) -> tuple[str, Callable[[dict[str, Any]], float] | Non
         )
     if topic == "camera":
         return "angle from the optical axis (rad)", off_axis
-    if topic == "loss":
-        return "residual over scale, |x| / c", lambda inputs: float(abs(inputs["x"]) / inputs["c"])
     return "", None
 
 
