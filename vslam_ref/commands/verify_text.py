@@ -102,7 +102,7 @@ def _next(report: Report, again: str) -> Iterator[str]:
     lost = report.count("lost digits")
     if lost:
         yield (
-            f"digits lost: {lost} answers are right to fewer digits than a careful formula gives; no "
+            f"digits lost: {lost} of the answers, right to fewer digits than a careful formula gives; no "
             "failure, unless --strict"
         )
     first = report.first

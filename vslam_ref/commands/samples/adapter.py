@@ -23,8 +23,8 @@ OTHERS = (
 
 README = """\
 A small library of rotations, motions and a pinhole camera, and the adapter that lets the vectors ask it. It
-needs Python only, nothing installed. Files to start from in C++, JavaScript, Rust, and MATLAB or Octave lie in
-the folders beside it; docs/adapters.md says what to replace in them.
+needs Python only, nothing installed. Files to start from in C++, JavaScript, Rust, and MATLAB or Octave lie
+in the folders beside it; docs/adapters.md says what to replace in them.
 
 format: one request a line on standard input, one reply a line on standard output, JSON (docs/adapters.md)
         convention.json   what the library means by its answers: its rotations come before its translations
