@@ -25,7 +25,7 @@ FEWEST_POINTS = 4
 GROUPS = ("so2", "se2", "so3", "quaternion", "se3", "sim3")
 
 
-class Picture(NamedTuple):
+class ErrorPicture(NamedTuple):
     """Errors of one function's answers.
 
     Attributes
@@ -47,7 +47,7 @@ class Picture(NamedTuple):
     verdicts: list[str]
 
 
-def pictures(outcomes: Iterable[Outcome]) -> list[Picture]:
+def pictures(outcomes: Iterable[Outcome]) -> list[ErrorPicture]:
     """Pictures of the functions that have failures or lost digits, basic ones first."""
     groups: dict[str, list[Outcome]] = {}
     for o in outcomes:
@@ -58,7 +58,7 @@ def pictures(outcomes: Iterable[Outcome]) -> list[Picture]:
     return [picture for picture in found if picture is not None]
 
 
-def _picture(function: str, outcomes: list[Outcome]) -> Picture | None:
+def _picture(function: str, outcomes: list[Outcome]) -> ErrorPicture | None:
     axis, number = _number(function)
     if number is None:
         return None
@@ -72,7 +72,7 @@ def _picture(function: str, outcomes: list[Outcome]) -> Picture | None:
             points.append((at, 10.0**-o.digits, o.status))
     if len(points) < FEWEST_POINTS:
         return None
-    return Picture(function, axis, *(list(part) for part in zip(*points, strict=True)))
+    return ErrorPicture(function, axis, *(list(part) for part in zip(*points, strict=True)))
 
 
 def _number(function: str) -> tuple[str, Callable[[dict[str, Any]], float] | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from vslam_ref.conformance.pictures import GROUPS, MOST_PICTURES, Picture, pictures
+from vslam_ref.conformance.pictures import GROUPS, MOST_PICTURES, ErrorPicture, pictures
 from vslam_ref.conformance.regimes import RegimeRow, basic_first, regime, rows
 from vslam_ref.conformance.results import KEYS, Outcome, Report, bounded
 from vslam_ref.support.pages import Html, details, page, table, tag
@@ -135,7 +135,7 @@ def _pictures(report: Report) -> Html | None:
     return Html(tag("h2", "Errors over the inputs") + tag("p", words + cut) + "".join(parts))
 
 
-def _drawn(picture: Picture) -> Html:
+def _drawn(picture: ErrorPicture) -> Html:
     from vslam_ref.plot.saving import figure_bytes
     from vslam_ref.plot.verification import error_figure
 
