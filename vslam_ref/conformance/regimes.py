@@ -87,15 +87,14 @@ def _count(value: Any) -> int:
 
 
 def basic_first(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Outcomes in the order in which one should look at them: basic functions, plain cases, large errors first."""
+    """Outcomes in the order in which one should look at them.
+
+    Basic functions first, plain cases first, and of these the ones with a named cause and a large error.
+    """
 
     def key(o: Outcome) -> tuple[Any, ...]:
-        return (
-            place(o.case.function),
-            *plainness(o.case),
-            0.0 if math.isnan(o.digits) else o.digits,
-            o.case.id,
-        )
+        digits = 0.0 if math.isnan(o.digits) else o.digits
+        return (place(o.case.function), *plainness(o.case), not o.cause, digits, o.case.id)
 
     return sorted(outcomes, key=key)
 
