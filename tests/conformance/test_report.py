@@ -24,6 +24,7 @@ from vslam_ref.conformance.results import MOST_NUMBERS, Report, bounded
 from vslam_ref.conformance.runner import run
 from vslam_ref.conformance.selection import select
 from vslam_ref.geometry import se3, sim3, so3
+from vslam_ref.plot.verification import error_figure
 
 
 def altered(change: dict[str, Any], *topics: str) -> Report:
@@ -253,6 +254,27 @@ def test_there_is_a_number_for_every_case_of_the_groups_that_can_fail() -> None:
                 else:
                     value = angle(case.inputs)
                 assert math.isnan(value) or value >= 0.0, case.id
+
+
+def test_the_figure_has_each_point_where_it_belongs() -> None:
+    """Zero stands left of all, a full turn and a half is half a turn, and each verdict has its own marker."""
+    at, errors = [0.0, 1e-3, 3.0, 3 * np.pi + 0.01], [1e-20, 1e-10, 0.1, 5.0]
+    verdicts = ["passed", "lost digits", "failed", "failed"]
+    figure = error_figure(at, errors, verdicts, axis="angle (rad)", half_turn=True)
+    left, right = figure.axes
+    drawn = {
+        line.get_label(): line.get_xydata() for line in left.lines if not line.get_label().startswith("_")
+    }
+    assert set(drawn) == {"passed", "lost digits", "failed"}
+    assert 0 < drawn["passed"][0][0] < 1e-3
+    assert drawn["passed"][0][1] == 1e-16
+    assert drawn["lost digits"].tolist() == [[1e-3, 1e-10]]
+    assert np.allclose(drawn["failed"], [[3.0, 0.1], [3 * np.pi + 0.01, 1.0]])
+    turned = {line.get_label(): line.get_xydata() for line in right.lines}
+    assert np.allclose(turned["failed"][:, 0], [np.pi - 3.0, 0.01])
+    assert np.allclose(turned["passed"][:, 0], np.pi)
+    assert left.get_xscale() == left.get_yscale() == right.get_xscale() == "log"
+    assert len(error_figure(at, errors, verdicts, axis="x", half_turn=False).axes) == 1
 
 
 # --- the page -----------------------------------------------------------------------------------------
