@@ -295,6 +295,11 @@ def test_a_program_that_only_ends_is_given_up() -> None:
     assert "no reply 25 times in a row" in report.stopped
 
 
+def test_a_program_that_ends_at_every_other_question_is_asked_them_all() -> None:
+    report = shortened("CV", "so3.exp", cases=80)
+    assert (report.count("error"), report.count("passed"), report.not_asked) == (40, 40, 0)
+
+
 def test_garbage_is_an_answer() -> None:
     report = shortened("G", "so3.exp", cases=40)
     assert (report.count("error"), report.not_asked) == (40, 0)
