@@ -46,6 +46,10 @@ def answer(function, inputs):
     if name == "aborts": os.abort()
     if name == "segfaults": ctypes.string_at(0)
     if name == "hangs": time.sleep(60)
+    if name == "compiles":
+        answer.slow = getattr(answer, "slow", 0) + 1
+        if answer.slow == 1: time.sleep(3.0)
+        return x
     if name == "spins":
         while True: pass
     if name == "recurses": return answer(function, inputs)
@@ -120,6 +124,17 @@ def test_other_kinds_of_replies(module: ModuleProgram) -> None:
     assert module.ask("1", "test.none", {}) == Reply("unsupported", None, "")
     assert str(module.ask("1", "test.nan", {}).value) == "nan"
     assert not [note for note in module.notes if "standard output" in note]
+
+
+def test_what_is_slow_once_is_not_stopped_for_it(folder: Path) -> None:
+    """A first call that compiles for longer than the timeout; its late reply is passed over."""
+    program = ModuleProgram(str(folder / "odd_module.py"), 2.0)
+    replies = [program.ask(str(x), "test.compiles", {"x": x}) for x in (1, 2, 3)]
+    notes = program.notes
+    program.close()
+    assert [r.what for r in replies] == ["timeout", "value", "value"]
+    assert [r.value for r in replies[1:]] == [2, 3]
+    assert notes == ("replies that came too late: 1 (--timeout 2)",)
 
 
 # --- what cannot be imported --------------------------------------------------------------------------

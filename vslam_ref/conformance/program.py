@@ -140,11 +140,10 @@ class Program:
             if self._process.ended:
                 self._process.kill()  # what it started may live
                 self._start()
-            before = self._replied
+            before, busy = self._replied, self._silences > 0 and self._known
             reply = self._once(identity, line.encode() + b"\n")
-            if (
-                reply.what == "crash" and before and self._process.status == 0
-            ):  # it ended after its last reply
+            ended = reply.what == "crash" and before and self._process.status == 0
+            if ended or (busy and reply.what == "timeout"):  # because of the question before this one
                 self._start()
                 reply = self._once(identity, line.encode() + b"\n")
         except (OSError, ValueError) as error:
@@ -195,21 +194,22 @@ class Program:
         if not self._known:
             self._seconds_to_start = time.monotonic() - self._began
         self._replied = self._known = True
+        self._silences = 0
         self._process.forget()
         self._stray, self._first_stray = self._stray + stray, self._first_stray or first
 
     def _silent(self, identity: str, first: str) -> Reply:
         """No reply in time.
 
-        A program that has replied before hangs, and is stopped; so is one that was started again.  The first
-        time a program may just start slowly: it is stopped when it is silent twice.
+        The first time it may be slow, as with a start or with compiling: what comes while the next question
+        waits is a late reply.  The second time it hangs, and is stopped.
         """
         self._timed_out.add(identity)
         if first:
             self._before_late = first
             return Reply("garbage", None, f"{first}; no reply followed", True)
         self._silences += 1
-        if self._replied or self.starts > 1 or self._silences > 1:
+        if self._silences > 1:
             self._process.kill()
         return Reply("timeout", None, f"no reply within {self.timeout:g} s", True)
 
