@@ -34,8 +34,8 @@ def _verdict(report: Report) -> Html:
     word = "all answered cases pass" if report.passed else "not verified"
     counts = (
         f": {report.count('passed')} passed, {report.count('failed')} failed, {report.count('error')} "
-        f"without a usable reply, {report.count('lost digits')} lost digits, {report.count('unsupported')} not "
-        "supported."
+        f"without a usable reply, {report.count('lost digits')} lost digits, "
+        f"{report.count('unsupported')} not supported."
     )
     said = [tag("p", tag("strong", word), counts, class_="good" if report.passed else "bad")]
     if report.not_asked:
