@@ -58,6 +58,10 @@ def missing(name: str) -> str:
         return "node is not installed"
     if name == "cpp" and compiler() is None:
         return "neither g++ nor clang++ is installed"
+    if name == "rust" and shutil.which("rustc") is None:
+        return "rustc is not installed"
+    if name == "octave" and shutil.which("octave-cli") is None:
+        return "GNU Octave is not installed"
     return ""
 
 
@@ -98,6 +102,24 @@ def compiled(source: str) -> str:
     return str(folder / "adapter")
 
 
+@functools.cache
+def compiled_rust(source: str) -> str:
+    """Compile a Rust program once, no warning allowed."""
+    folder = Path(tempfile.mkdtemp(dir=WORK.name))
+    (folder / "adapter.rs").write_text(source, encoding="utf-8")
+    command = ["rustc", "--deny", "warnings", "-o", "adapter", "adapter.rs"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return str(folder / "adapter")
+
+
+def octave(source: str) -> Program:
+    """A program in Octave, from its text."""
+    folder = Path(tempfile.mkdtemp(dir=WORK.name))
+    (folder / "adapter.m").write_text(source, encoding="utf-8")
+    return Program(f"octave-cli --quiet --eval \"addpath('{folder}'); adapter\"", 60.0)
+
+
 def module_file(name: str) -> Path:
     """File of an adapter in Python."""
     return HERE / f"{name if name.endswith('_usual') else f'{name}_adapter'}.py"
@@ -107,6 +129,10 @@ def asked(name: str) -> Asked:
     """The adapter, ready to answer."""
     if name == "cpp":
         return Program(compiled((SHIPPED / "cpp" / "adapter.cpp").read_text("utf-8")), 60.0)
+    if name == "rust":
+        return Program(compiled_rust((SHIPPED / "rust" / "adapter.rs").read_text("utf-8")), 60.0)
+    if name == "octave":
+        return octave((SHIPPED / "octave" / "adapter.m").read_text("utf-8"))
     if name == "node":
         return Program(f"node '{SHIPPED / 'node' / 'adapter.mjs'}'", 60.0)
     return InProcess(str(module_file(name)))

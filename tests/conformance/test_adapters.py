@@ -173,7 +173,7 @@ STRANGE = [
 ]
 
 
-@pytest.mark.parametrize("name", ["cpp", "node", "serve"])
+@pytest.mark.parametrize("name", ["cpp", "node", "octave", "rust", "serve"])
 def test_programs_survive_strange_lines(name: str) -> None:
     """One reply to each line but blank ones, in order, with its id."""
     command = [sys.executable, "-m", "vslam_ref.conformance.serve", str(lists.module_file("scipy"))]
@@ -183,10 +183,16 @@ def test_programs_survive_strange_lines(name: str) -> None:
         assert isinstance(asked, Program)
         asked.close()
         command = asked.words
-    text = "\n".join(line for line, _ in STRANGE) + "\n"
+    lines = list(STRANGE)
+    if name in ("octave", "rust"):  # these answer so3 only
+        lines = [
+            (line.replace("so2", "so3").replace('"angle": 0.0', '"phi": [0, 0, 0]'), what)
+            for line, what in lines
+        ]
+    text = "\n".join(line for line, _ in lines) + "\n"
     done = subprocess.run(command, input=text.encode(), capture_output=True, timeout=60)
     replies = [json.loads(line) for line in done.stdout.splitlines()]
-    wanted = [(line, what) for line, what in STRANGE if what != "skipped"]
+    wanted = [(line, what) for line, what in lines if what != "skipped"]
     assert done.returncode == 0
     assert len(replies) == len(wanted)
     for (line, what), reply in zip(wanted, replies, strict=True):
@@ -263,3 +269,39 @@ def test_every_function_of_an_adapter_is_in_the_catalogue() -> None:
         names |= {name for name in found if "." in name}
     assert names <= set(functions()), sorted(names - set(functions()))
     assert vectors_format.names()
+
+
+# --- adapters to start from ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["octave", "rust"])
+def test_files_to_start_from_answer_rightly(name: str) -> None:
+    """What they show passes: a matrix, a vector, an object with a refusal, another model unsupported."""
+    lists.need(name)
+    report = lists.verified(name, lists.chosen(3, {"so3", "se3", "camera"}), Convention())
+    answered = {o.case.function for o in report.outcomes if o.status == "passed"}
+    assert answered == {"so3.exp", "se3.act", "camera.project"}
+    assert report.passed
+    assert {o.case.result for o in report.outcomes if o.status == "passed"} == {"valid", "invalid"}
+
+
+WRONG_STARTS = [
+    ("rust", "b * x * y - a * z", "b * x * y + a * z"),
+    ("octave", "W = [0, -phi(3), phi(2)", "W = [0, phi(3), phi(2)"),
+]
+
+
+@pytest.mark.parametrize(("name", "right", "wrong"), WRONG_STARTS)
+def test_a_wrong_sign_in_them_is_found(name: str, right: str, wrong: str) -> None:
+    lists.need(name)
+    source = (lists.SHIPPED / ("rust/adapter.rs" if name == "rust" else "octave/adapter.m")).read_text(
+        "utf-8"
+    )
+    assert source.count(right) == 1
+    text = source.replace(right, wrong)
+    program = Program(lists.compiled_rust(text), 60.0) if name == "rust" else lists.octave(text)
+    try:
+        report = run(program, lists.chosen(4, {"so3"}))
+    finally:
+        program.close()
+    assert {o.case.function for o in report.outcomes if o.status == "failed"} == {"so3.exp"}

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vslam_ref.conformance import runner
 from vslam_ref.conformance import vectors_format as form
 from vslam_ref.conformance.compare import compare, numbers
-from vslam_ref.conformance.program import InProcess
+from vslam_ref.conformance.conventions import Convention
+from vslam_ref.conformance.program import InProcess, Reply
 from vslam_ref.conformance.report import verification_page
+from vslam_ref.conformance.results import NOTHING
 from vslam_ref.conformance.runner import Report, run
+from vslam_ref.support.json_text import to_json
 
 LOOSE = {
     "relative": 1e-12,
@@ -213,10 +217,215 @@ def test_at_most_twenty_of_a_regime_count() -> None:
     assert form.counted(file.cases) == 25
 
 
-def test_the_page_holds_causes_and_failures_and_escapes() -> None:
-    report = one(np.eye(3).tolist())._replace(program="<b>mine</b>")
-    text = verification_page(report)
-    assert "&lt;b&gt;mine" in text
-    assert "you forget the angle" in text
-    assert "so3.exp/generic-01" in text
-    assert "src=" not in text
+# --- a run that ends early ----------------------------------------------------------------------------
+
+
+class Scripted:
+    """It replies as it is told: V a value, U unsupported, G garbage, T silence, C a crash, I Ctrl-C."""
+
+    name = "scripted"
+    notes = ()
+
+    def __init__(self, script: str, alive: bool = True) -> None:
+        self.script, self.asked, self.alive = script, 0, alive
+
+    def ask(self, identity: str, function: str, inputs: dict[str, Any]) -> Reply:
+        letter = self.script[self.asked % len(self.script)]
+        self.asked += 1
+        if letter == "I":
+            raise KeyboardInterrupt
+        self.alive = self.alive or letter in "VUG"
+        value = Reply("value", R.tolist(), "")
+        unsupported, garbage = Reply("unsupported", None, ""), Reply("garbage", None, "a set")
+        silence, crash = Reply("timeout", None, "no reply", True), Reply("crash", None, "it ended", True)
+        return {"V": value, "U": unsupported, "G": garbage, "T": silence, "C": crash}[letter]
+
+    def close(self) -> None:
+        pass
+
+
+def many(*functions: str, cases: int = 10) -> form.VectorFile:
+    inputs = {name: R.tolist() for name in ("phi", "R", "a", "b", "M", "fraction", "N")}
+    one_case = {**EXP["cases"][0], "inputs": inputs, "mistakes": {}}  # type: ignore[dict-item]
+    return file_of(
+        *(
+            {
+                "function": name,
+                "cases": [
+                    {**one_case, "id": f"{name}/generic-{k:02d}", "mistakes": {}} for k in range(cases)
+                ],  # type: ignore[dict-item]
+            }
+            for name in functions
+        )
+    )
+
+
+def shortened(script: str, *functions: str, cases: int = 10, alive: bool = True) -> Report:
+    return run(Scripted(script, alive), [many(*functions, cases=cases)])
+
+
+def test_a_program_that_is_silent_five_times_in_a_row_is_given_up() -> None:
+    report = shortened("VVTTTTTV", "so3.exp")
+    assert (len(report.outcomes), report.not_asked) == (7, 3)
+    assert "given up: silent 5 times in a row; the last: timeout, no reply" in report.stopped
+    assert (report.count("passed"), report.count("error"), report.passed) == (2, 5, False)
+    for script in ("TTTTV", "TTTTG", "TTTTU"):  # an answer of any kind is a sign of life
+        assert shortened(script, "so3.exp").not_asked == 0
+
+
+def test_a_program_that_never_replies_is_given_up_after_five() -> None:
+    assert shortened("C", "so3.exp", alive=False).not_asked == 5
+    assert shortened("CCCTT", "so3.exp", alive=False).not_asked == 5
+    assert shortened("CCCCV", "so3.exp", alive=False).not_asked == 0
+
+
+def test_a_function_that_ends_the_program_is_left_out_and_the_others_are_asked() -> None:
+    report = shortened("CCCCCVVVVVVVVVV", "so3.exp", "so3.log", cases=10)
+    assert [o.case.function for o in report.outcomes] == ["so3.exp"] * 5 + ["so3.log"] * 10
+    assert report.not_asked == 5
+    assert report.stopped == ""
+    assert "so3.exp: the program ended 5 times in a row; not all of its 10 cases were asked" in report.notes
+    assert not report.passed
+
+
+def test_a_program_that_only_ends_is_given_up() -> None:
+    names = [f"so3.{name}" for name in ("exp", "log", "left_jacobian", "interpolate", "nearest", "random")]
+    report = shortened("C", *names)
+    assert len(report.outcomes) == 25
+    assert "no reply 25 times in a row" in report.stopped
+
+
+def test_a_program_that_ends_at_every_other_question_is_asked_them_all() -> None:
+    report = shortened("CV", "so3.exp", cases=80)
+    assert (report.count("error"), report.count("passed"), report.not_asked) == (40, 40, 0)
+
+
+def test_garbage_is_an_answer() -> None:
+    report = shortened("G", "so3.exp", cases=40)
+    assert (report.count("error"), report.not_asked) == (40, 0)
+
+
+def test_an_interrupt_leaves_a_report_of_what_was_found() -> None:
+    report = shortened("VVVI", "so3.exp")
+    assert (report.count("passed"), report.not_asked, report.stopped) == (3, 7, "interrupted")
+    assert not report.passed
+    assert report.numbers()["stopped"] == "interrupted"
+
+
+# --- strange answers ----------------------------------------------------------------------------------
+
+
+STRANGE = [
+    float("nan"),
+    [[float("nan")] * 3] * 3,
+    10**400,
+    [[10**250] * 3] * 3,
+    None,
+    {},
+    [],
+    {"R": None},
+    {"R": {"R": R.tolist()}},
+    [[[1.0]]],
+    "inf",
+    [["nan"], 1],
+    True,
+    [None],
+]
+
+
+@pytest.mark.parametrize("answer", STRANGE, ids=str)
+@pytest.mark.parametrize("result", ["valid", "invalid", "convention"])
+def test_strange_answers_do_not_pass_and_can_be_written(answer: Any, result: str) -> None:
+    """In every kind of case, and in a program's own conventions."""
+    report = one(answer, result=result)
+    assert report.count("passed") == 0
+    assert json.loads(to_json(report.numbers()))["failures"][0]["id"] == "so3.exp/generic-01"
+    assert "so3.exp/generic-01" in verification_page(report)
+
+
+POSES = ["multiview.pnp", "se3.exp", "camera.jacobian_pose", "quaternion.from_rotation", "ekf.trace"]
+
+
+@pytest.mark.parametrize("function", POSES)
+def test_strange_answers_are_harmless_in_other_conventions(function: str) -> None:
+    topic = next(name for name in form.names() if name.endswith(f"/{function.partition('.')[0]}.json"))
+    whole = form.load(topic)
+    file = whole._replace(cases=[c for c in whole.cases if c.function == function][:2])
+    foreign = Convention(
+        "world_from_cam", "right", "rotation_first", "xyzw", "corner", "measured_minus_predicted"
+    )
+    for answer in STRANGE:
+        report = run(asked({function: lambda answer=answer, **_: answer}), [file], foreign)
+        assert report.count("passed") == 0
+        to_json(report.numbers())
+
+
+# --- digits -------------------------------------------------------------------------------------------
+
+
+def test_right_digits_are_told_of_passed_cases_too() -> None:
+    report = one((R + 1e-13).tolist())
+    (row,) = report.numbers()["functions"]
+    assert row["passed"] == row["cases"] == 1
+    assert abs(row["digits_worst"] - 13.0) < 0.01
+    (row,) = one((R + 1e-5).tolist()).numbers()["functions"]
+    assert abs(row["digits_median"] - 5.0) < 0.01
+    assert row["passed"] == 0
+
+
+def test_lost_digits_are_no_failure_and_counted_apart() -> None:
+    rule = {**LOOSE, "lost_digits": {"relative": 1e-6, "absolute": 0.0, "reason": "an arc cosine"}}
+    group = {**EXP, "tolerance": rule}
+    report = run(asked({"so3.exp": lambda phi: (R + 1e-9).tolist()}), [file_of(group, notes=NOTES)])
+    numbers_ = report.numbers()
+    assert (report.count("lost digits"), report.count("failed"), numbers_["digits_lost"]) == (1, 0, 1)
+    assert numbers_["functions"][0]["digits_lost"] == 1
+    assert numbers_["failures"] == []
+    assert [f["id"] for f in numbers_["lost"]] == ["so3.exp/generic-01"]
+    assert numbers_["first_failure"] is None
+
+
+# --- names of functions -------------------------------------------------------------------------------
+
+
+def test_names_of_functions_are_asked_for_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    again = []
+
+    def namer(outcomes: Any, ask: Any, profile: str) -> dict[str, str]:
+        again.append(ask("so3.exp", {"phi": [0.0, 0.0, 0.0]}))
+        assert outcomes[0].got == {"R": (R + 1.0).tolist()}
+        return {"so3.exp": "one is added"}
+
+    monkeypatch.setattr(runner, "_namer", lambda: namer)
+    report = one((R + 1.0).tolist())
+    assert again == [{"R": (R + 1.0).tolist()}]
+    told = report.numbers()
+    assert told["functions"][0]["name"] == told["failures"][0]["name"] == "one is added"
+    assert told["unexplained"] == {}
+    assert "one is added" in verification_page(report)
+
+
+def test_names_that_fail_or_do_not_fit_lose_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: Any) -> dict[str, str]:
+        raise ZeroDivisionError("no name")
+
+    monkeypatch.setattr(runner, "_namer", lambda: fails)
+    report = one((R + 1.0).tolist())
+    assert report.count("failed") == 1
+    assert any("ZeroDivisionError" in note for note in report.notes)
+    monkeypatch.setattr(runner, "_namer", lambda: lambda *_: {"so3.exp": NOTHING})
+    report = one((R + 1.0).tolist())
+    assert report.unexplained == {"so3.exp": 1}
+    assert report.numbers()["failures"][0]["name"] == NOTHING
+
+
+def test_a_program_that_gives_no_reply_is_not_asked_again_for_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = Scripted("VT")
+
+    def namer(outcomes: Any, ask: Any, profile: str) -> dict[str, str]:
+        return {str(k): str(ask("so3.exp", {"phi": [0.0, 0.0, 0.0]})) for k in range(10)}
+
+    program.script = "V" + 50 * "T"
+    monkeypatch.setattr(runner, "_namer", lambda: namer)
+    run(program, [many("so3.exp", cases=1)])
+    assert program.asked == 3

@@ -3,38 +3,63 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vslam_ref.commands.options import add_json, file_target, json_target, print_backend, write_json
+from vslam_ref.commands.options import (
+    add_json,
+    file_target,
+    json_target,
+    print_backend,
+    print_notes,
+    progress_bar,
+    write_json,
+)
 
 if TYPE_CHECKING:
-    from vslam_ref.conformance.nees_runs import Judgement
-    from vslam_ref.conformance.program import Asked
-    from vslam_ref.conformance.runner import Report
+    from vslam_ref.conformance.replies import Asked
+    from vslam_ref.conformance.results import Report
     from vslam_ref.conformance.vectors_format import VectorFile
 
 HELP = "verify a program's formulas, signs and conventions with the conformance vectors"
 EPILOG = """\
-The program is started once. It reads one request a line and writes one reply a line, both JSON:
+--program CMD: it is started once, reads one request a line and writes one reply a line, both JSON:
   {"id": "...", "function": "so3.exp", "inputs": {"phi": [0.1, 0.2, 0.3]}}
   {"id": "...", "value": {"R": [[...], [...], [...]]}}, or
   {"id": "...", "unsupported": true}, or {"id": "...", "error": "..."}
-'vslam-ref vectors list' names the functions. A program with conventions of its own says so in a JSON file:
+CMD is split as a shell would; a path with spaces is quoted twice: --program "'/my slam/adapter' --fast".
+
+--module NAME: a Python module, or file.py, also in the folder you stand in. It has a function
+  def answer(function, inputs):      # "so3.exp", {"phi": [0.1, 0.2, 0.3]} -> {"R": [[...], ...]}
+that returns lists or arrays, raises NotImplementedError where it has no such function ("unsupported"), and
+any other exception where it refuses the inputs ("error"). It runs in a process of its own: it may print, hang
+or crash.
+
+'vslam-ref vectors list' names the functions. What is unsupported is counted apart and is no failure.
+--chapter, --topic, --function and --case add up: each adds its cases. A program with conventions of its own
+says so in a JSON file:
   {"transform": "world_from_cam", "perturbation": "right", "tangent_order": "rotation_first"}
+
+A program that is silent five times in a row is given up; Ctrl-C ends a run. In both cases page and JSON are
+written, with what was found until then.
 
 --nees judges a filter by its simulated runs, at least 10, each with the same steps: a CSV with the columns
 run, step, e1..ed, P11..Pdd (row by row), or an .npz with the arrays run, step, error, covariance. Its
 --report is a page (.html) or the figure alone (.png, .svg).
 
-Status: 0 all answered cases pass, 1 some fail, 2 bad use.
+Status: 0 all answered cases pass, 1 some fail or were not asked (with --strict also: digits are lost),
+2 bad use, 130 interrupted.
 
 examples, the first after 'vslam-ref sample adapter --out samples':
   vslam-ref verify --program "python samples/adapter/my_slam_adapter.py" \\
       --convention samples/adapter/convention.json
-  vslam-ref verify --module my_package.adapter --chapter 2 --convention mine.json
+  vslam-ref verify --module my_adapter.py --function so3.exp --function so3.log --report report.html
   vslam-ref verify --self
   vslam-ref verify --nees runs.csv --dof 3"""
+INTERRUPTED = 128 + signal.SIGINT
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,161 +71,127 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     which.add_argument("--self", action="store_true", help="check this library")
     which.add_argument("--nees", metavar="FILE", help="judge a filter's simulated runs")
+    more = "; may repeat"
+    parser.add_argument("--chapter", metavar="C", type=int, action="append", help=f"ask this chapter{more}")
+    parser.add_argument("--topic", metavar="T", action="append", help=f"ask this topic, as so3{more}")
     parser.add_argument(
-        "--chapter", metavar="C", type=int, action="append", help="only this chapter; may repeat"
+        "--function", metavar="NAME", action="append", help=f"ask this function, as so3.exp{more}"
     )
-    parser.add_argument("--topic", metavar="T", action="append", help="only this topic, as so3; may repeat")
-    parser.add_argument("--case", metavar="ID", action="append", help="only this case; may repeat")
+    parser.add_argument(
+        "--case", metavar="ID", action="append", help=f"ask this case, and show what the program prints{more}"
+    )
     parser.add_argument("--convention", metavar="FILE", help="the program's conventions, JSON")
     parser.add_argument("--float32", action="store_true", help="tolerances of single precision")
-    parser.add_argument("--timeout", metavar="S", type=float, default=10.0, help="seconds a reply may take")
-    parser.add_argument("--report", metavar="FILE", help="write a page with every failure")
+    parser.add_argument("--strict", action="store_true", help="status 1 also where digits are lost")
+    parser.add_argument(
+        "--timeout", metavar="S", type=float, default=10.0, help="seconds a reply may take (default: 10)"
+    )
+    parser.add_argument("--report", metavar="FILE", help="write a page: functions, pictures, failures")
     parser.add_argument("--dof", metavar="D", type=int, help="with --nees: length d of the error")
     add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask, judge, print, and write what was asked for."""
+    """Ask, judge, write what was asked for, and print."""
     target = json_target(options)
     page = file_target(options.report)
     if options.nees is not None:
-        return _nees(options, target, page)
+        from vslam_ref.commands.verify_nees import judge_runs
+
+        return judge_runs(options, target, page)
     if not 0 < options.timeout < float("inf"):
         raise ValueError(f"--timeout {options.timeout:g}: need seconds, more than 0")
     from vslam_ref.conformance.conventions import Convention, read
+    from vslam_ref.conformance.selection import select
 
     convention = Convention() if options.convention is None else read(Path(options.convention))
-    chosen = _files(options)
-    asked = _asked(options)
-    try:
-        report = _run(asked, chosen, convention, "float32" if options.float32 else "float64")
-    finally:
-        asked.close()
-    _show(report)
-    if options.self:
-        print_backend()
-    if page is not None:
-        from vslam_ref.conformance.report import verification_page as html
-        from vslam_ref.support import files
+    chosen = select(*(getattr(options, name) or () for name in ("chapter", "topic", "function", "case")))
+    with _terminated_as_interrupted():
+        asked = _asked(options)
+        try:
+            report = _run(asked, chosen, convention, "float32" if options.float32 else "float64")
+        finally:
+            asked.close()
+    _write(report, target, page)
+    _print(report, options)
+    if report.stopped == "interrupted":
+        return INTERRUPTED
+    return 0 if report.passed and not (options.strict and report.count("lost digits")) else 1
 
-        files.write_text(page, html(report))
-    write_json(target, report.numbers())
-    return 0 if report.passed else 1
+
+@contextlib.contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Take a polite end from outside, as by ``timeout 60 vslam-ref ...``, for Ctrl-C: write the report."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _asked(options: argparse.Namespace) -> Asked:
-    from vslam_ref.conformance.program import InProcess, Program
+    from vslam_ref.conformance.program import InProcess, ModuleProgram, Program
 
+    shown = bool(options.case)
     if options.program is not None:
-        return Program(options.program, options.timeout)
-    return InProcess("vslam_ref.conformance.adapters.itself" if options.self else options.module)
-
-
-def _files(options: argparse.Namespace) -> list[VectorFile]:
-    """The files that were asked for; ValueError where there are none."""
-    from vslam_ref.conformance.vectors_format import load, names
-
-    found = [load(name) for name in names()]
-    kept = [
-        file
-        for file in found
-        if (not options.chapter or file.chapter in options.chapter)
-        and (not options.topic or Path(file.name).stem in options.topic)
-    ]
-    if options.case:
-        chosen = [file._replace(cases=[c for c in file.cases if c.id in options.case]) for file in kept]
-        kept = [file for file in chosen if file.cases]
-        missing = set(options.case) - {c.id for file in kept for c in file.cases}
-        if missing:
-            raise ValueError(f"no case {sorted(missing)[0]!r} in the chosen chapters and topics")
-    if not kept:
-        chapters = ", ".join(map(str, sorted({file.chapter for file in found})))
-        topics = ", ".join(Path(file.name).stem for file in found)
-        raise ValueError(f"no vectors of that chapter or topic; chapters: {chapters}; topics: {topics}")
-    return kept
+        return Program(options.program, options.timeout, show_errors=shown)
+    if options.module is not None:
+        return ModuleProgram(options.module, options.timeout, show_errors=shown)
+    return InProcess("vslam_ref.conformance.adapters.itself")
 
 
 def _run(asked: Asked, chosen: list[VectorFile], convention: Any, profile: Any) -> Report:
     """Run with a progress bar where somebody watches."""
-    from tqdm import tqdm
-
+    from vslam_ref.conformance.results import Outcome
     from vslam_ref.conformance.runner import run as run_cases
 
-    total = sum(len(file.cases) for file in chosen)
-    with tqdm(total=total, unit="case", disable=None, leave=False) as bar:
-        return run_cases(asked, chosen, convention, profile, lambda _: bar.update())
+    bad = 0
+    with progress_bar(sum(len(file.cases) for file in chosen), "case") as bar:
+
+        def progress(outcome: Outcome) -> None:
+            nonlocal bad
+            bad += outcome.bad
+            bar.set_postfix_str(f"{outcome.case.function}, {bad} failed", refresh=False)
+            bar.update()
+
+        return run_cases(asked, chosen, convention, profile, progress)
 
 
-def _show(report: Report) -> None:
-    from vslam_ref.commands.tables import table
-
-    numbers = report.numbers()
-    rows = [
-        [chapter, *(str(counts[key]) for key in ("passed", "failed", "unsupported", "errors"))]
-        for chapter, counts in numbers["by_chapter"].items()
-    ]
-    total = [str(numbers[key]) for key in ("passed", "failed", "unsupported", "errors")]
-    print(f"{report.program}: {numbers['cases']} cases")
-    print(table(["chapter", "passed", "failed", "unsupported", "errors"], [*rows, ["all", *total]]))
-    for found in numbers["diagnoses"][:20]:
-        print(f"{found['function']}: {found['cause']} ({found['cases']} cases, first {found['first']})")
-    first = numbers["first_failure"]
-    if first is not None:
-        print(f"\nfirst failure: {first['id']} ({first['file']}, {first['equation']})")
-        for key in ("inputs", "where", "expected", "got", "difference", "allowed", "cause"):
-            print(f"  {key:<10} {_short(first[key])}")
-    if not any(o.status == "passed" for o in report.outcomes):
-        print("nothing passed: a program that answers nothing is not verified")
-    elif report.passed:
-        print("all answered cases pass")
-
-
-def _short(value: Any, most: int = 300) -> str:
-    text = str(value)
-    return text if len(text) <= most else f"{text[:most]} …"
-
-
-def _nees(options: argparse.Namespace, target: Path | None, page: Path | None) -> int:
-    """Judge a filter's runs."""
-    from vslam_ref.conformance.nees_files import read
-    from vslam_ref.conformance.nees_runs import MEANINGS, judge
-
-    if page is not None and page.suffix not in (".html", ".png", ".svg"):
-        raise ValueError(f"--report {page}: need a name that ends in .html, .png or .svg")
-    runs = read(Path(options.nees), options.dof)
-    found = judge(runs)
-    print(f"{options.nees}: {found.runs} runs of {found.steps} steps, errors of {found.dof} numbers")
-    if found.invalid:
-        print(
-            f"{found.invalid} covariances of {found.runs * found.steps} are not symmetric positive definite"
-        )
-    else:
-        _show_windows(found)
-    print(f"{found.verdict}: {MEANINGS[found.verdict]}")
+def _write(report: Report, target: Path | None, page: Path | None) -> None:
+    """Write the numbers first, then the page."""
+    write_json(target, report.numbers())
     if page is not None:
-        from vslam_ref.conformance.nees_page import write
+        from vslam_ref.conformance.report import verification_page
+        from vslam_ref.support import files
 
-        write(page, str(options.nees), runs, found)
-    write_json(target, found.numbers())
-    return 0 if found.consistent else 1
+        files.write_text(page, verification_page(report))
 
 
-def _show_windows(found: Judgement) -> None:
-    from vslam_ref.commands.tables import table
+def _print(report: Report, options: argparse.Namespace) -> None:
+    from vslam_ref.commands.verify_text import text
 
-    words = {-1: "below", 0: "inside", 1: "above"}
-    rows = [
-        [
-            w.name,
-            f"{w.mean:.3f}",
-            f"{w.low:.3f}",
-            f"{w.high:.3f}",
-            words[w.side],
-            f"{w.independent_steps:.1f}",
-        ]
-        for w in found.windows
-    ]
-    print(table(["window", "mean NEES", "low", "high", "mean is", "independent steps"], rows))
-    low, high = found.interval
-    print(f"all steps: {found.mean:.3f} for {found.dof}; 95 % over resampled runs: {low:.3f} to {high:.3f}")
-    print(f"an honest filter is called otherwise in about {100 * found.false_alarm:g} % of such studies")
+    print(text(report, _again(options)))
+    print_notes(report.notes)
+    if options.self:
+        print_backend()
+
+
+def _again(options: argparse.Namespace) -> str:
+    """The command line of this run without its choice of cases and its outputs."""
+    import shlex
+
+    words = ["vslam-ref", "verify"]
+    for name in ("program", "module", "convention"):
+        if getattr(options, name) is not None:
+            words += [f"--{name}", getattr(options, name)]
+    words += [f"--{name}" for name in ("self", "float32") if getattr(options, name)]
+    words += ["--timeout", f"{options.timeout:g}"] if options.timeout != 10.0 else []
+    return shlex.join(words)

@@ -17,7 +17,7 @@ KINDS = {
     "colmap": "a reconstruction and its true scene (COLMAP, text)",
     "boards": "pictures of a checkerboard by a radtan and a FOV camera, and both cameras",
     "trajectory": "an estimated and a true trajectory (TUM)",
-    "adapter": "a program that answers conformance vectors (Python)",
+    "adapter": "a program that answers conformance vectors (Python), and others to start from",
     "video": "a rendered film of a desk, its camera and its true path (PNG, AVI, TUM)",
 }
 """Name -> what it is.  The place in this table is part of a kind's seed: new kinds go to the end."""
