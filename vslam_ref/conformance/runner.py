@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 from vslam_ref.conformance.catalogue import functions
 from vslam_ref.conformance.compare import Difference, Profile, compare
 from vslam_ref.conformance.conventions import Convention
-from vslam_ref.conformance.diagnose import diagnose, known_mistake
+from vslam_ref.conformance.diagnosis import diagnose, known_mistake
 from vslam_ref.conformance.program import Asked, Reply
 from vslam_ref.conformance.statistics import judge
 from vslam_ref.conformance.vectors_format import Case, VectorFile
@@ -33,6 +33,8 @@ class Outcome(NamedTuple):
     cause : str
         Probable cause, or what went wrong with the reply; of a passed case of the kind "convention", which
         other convention it was.
+    got : object
+        What the program answered, in the house's convention.
     """
 
     file: VectorFile
@@ -40,6 +42,7 @@ class Outcome(NamedTuple):
     status: Status
     difference: Difference | None
     cause: str
+    got: Any = None
 
 
 class Report(NamedTuple):
@@ -157,11 +160,11 @@ def ask(asked: Asked, file: VectorFile, case: Case, convention: Convention, prof
         return Outcome(file, case, "error", None, f"garbage: {error}")
     difference = judge(case, got) if case.statistic is not None else compare(case, got, profile)
     if difference.right:
-        return Outcome(file, case, "passed", None, "")
+        return Outcome(file, case, "passed", None, "", got)
     cause = diagnose(file, case, got, profile)
     if case.result == "convention" and cause:
-        return Outcome(file, case, "passed", None, cause)
-    return Outcome(file, case, "failed", difference, cause)
+        return Outcome(file, case, "passed", None, cause, got)
+    return Outcome(file, case, "failed", difference, cause, got)
 
 
 def _named(value: Any, outputs: list[str]) -> dict[str, Any]:

@@ -1,0 +1,206 @@
+"""An input is taken in another way: negated, transposed, in degrees, exchanged, left out.
+
+Where the change can be undone, the program is asked once more with the changed input, and must then be right.
+Where it cannot (an input is ignored, only the first row is used), the library says what such a program
+answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from vslam_ref.arrays import Array
+from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess, array, outputs
+from vslam_ref.conformance.vectors_format import Case
+
+UNDONE: dict[str, Callable[[Array], Array]] = {
+    "is taken with the other sign": lambda x: -x,
+    "is taken transposed": lambda x: _square(np.swapaxes(x, -1, -2)),
+    "is taken inverted": lambda x: np.linalg.inv(x) if x.ndim >= 2 else 1.0 / x,
+    "is taken in degrees": np.degrees,
+    "is taken squared": np.sqrt,
+    "is taken without its square root": np.square,
+    "is taken in the reversed order": lambda x: _rows(x, 1)[::-1],
+    "is taken with columns for rows": lambda x: _rows(x, 2)[..., ::-1],
+    "is taken with its halves exchanged": lambda x: np.roll(x, x.shape[-1] // 2, -1),
+    "is taken twice as large": lambda x: 0.5 * x,
+    "is taken half as large": lambda x: 2.0 * x,
+    "is taken with w last": lambda x: x[..., [1, 2, 3, 0]],
+    "is taken conjugated": lambda x: x * [1, -1, -1, -1],
+}
+"""What the program does to an input -> the change that undoes it."""
+
+LOST: dict[str, Callable[[Array], Array]] = {
+    "is left out (as if it were zero)": np.zeros_like,
+    "is left out (as if it were one)": np.ones_like,
+    "is left out (as if it were the identity)": lambda x: np.broadcast_to(np.eye(x.shape[-1]), _square(x).shape),
+    "is used by its diagonal only": lambda x: _square(x) * np.eye(x.shape[-1]),
+    "is used by its size, without its sign": np.abs,
+    "is used up to the last": lambda x: _rows(x, 1)[:-1],
+    "is used from the second on": lambda x: _rows(x, 1)[1:],
+    "is used by its first row for all": lambda x: np.broadcast_to(_rows(x, 2)[0], x.shape),
+    "is cut to whole numbers": np.trunc,
+    "is rounded to whole numbers": np.round,
+    "is rounded down to whole numbers": np.floor,
+    "is rounded to single precision": lambda x: x.astype(np.float32).astype(np.float64),
+    "is brought to unit length first": lambda x: x / np.linalg.norm(x, axis=-1, keepdims=True),
+}
+"""What the program does to an input, where it cannot be undone."""
+MOST_ENTRIES = 12
+
+
+def _square(x: Array) -> Array:
+    if x.ndim < 2 or x.shape[-1] != x.shape[-2]:
+        raise ValueError("no square matrix")
+    return x
+
+
+def _rows(x: Array, dimensions: int) -> Array:
+    if x.ndim < dimensions or len(x) < 2:
+        raise ValueError("no rows")
+    return x
+
+
+def undone(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Repairs: the program is asked with a changed input."""
+    names = [name for name in evidence.function.inputs]
+    for name in names:
+        for words, change in UNDONE.items():
+            yield f"the input {name} {words}", _asked(evidence, lambda given, n=name, c=change: _on(given, n, c))
+        yield from _angles(evidence, name)
+    for a, b in combinations(names, 2):
+        yield f"the inputs {a} and {b} are exchanged", _asked(evidence, lambda given, a=a, b=b: _exchanged(given, a, b))
+
+
+def _angles(evidence: Evidence, name: str) -> Iterator[tuple[str, Guess]]:
+    """One entry of a short input: its sign, its unit."""
+    x = array(evidence.failed[0].case.inputs.get(name))
+    if x is None or x.ndim != 1 or not 2 <= x.size <= MOST_ENTRIES:
+        return
+    for k in range(x.size):
+        words = f"entry {k} of the input {name} is taken"
+        yield f"{words} with the other sign", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, lambda y: -y)))
+        yield f"{words} in degrees", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, np.degrees)))
+    for j, k in combinations(range(x.size), 2):
+        words = f"entries {j} and {k} of the input {name} are exchanged"
+        yield words, _asked(evidence, lambda g, j=j, k=k: _on(g, name, _swapped(j, k)))
+
+
+def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Wrong formulas: the library's answer where an input, or an entry of one, is lost."""
+    for name in evidence.function.inputs:
+        for words, change in LOST.items():
+            yield f"the input {name} {words}", _reference(evidence, lambda g, n=name, c=change: _on(g, n, c))
+        x = array(evidence.failed[0].case.inputs.get(name))
+        if x is not None and x.ndim == 1 and 2 <= x.size <= MOST_ENTRIES:
+            for k in range(x.size):
+                zeroed = _entry(k, lambda y: 0.0 * y)
+                words = f"entry {k} of the input {name} is left out (as if it were zero)"
+                yield words, _reference(evidence, lambda g, n=name, z=zeroed: _on(g, n, z))
+    for words, change in UNDONE.items():
+        for name in evidence.function.inputs:
+            yield f"the input {name} {words}", _reference(evidence, lambda g, n=name, c=UNDOES.get(words, change): _on(g, n, c))
+    for a, b in combinations(evidence.function.inputs, 2):
+        yield f"{a} is used for {b}", _reference(evidence, lambda g, a=a, b=b: _for(g, a, b))
+        yield f"{b} is used for {a}", _reference(evidence, lambda g, a=a, b=b: _for(g, b, a))
+
+
+UNDOES: dict[str, Callable[[Array], Array]] = {
+    "is taken in degrees": np.radians,
+    "is taken squared": np.square,
+    "is taken without its square root": np.sqrt,
+    "is taken twice as large": lambda x: 2.0 * x,
+    "is taken half as large": lambda x: 0.5 * x,
+    "is taken with w last": lambda x: x[..., [3, 0, 1, 2]],
+}
+"""The changes that are not their own way back, as the program makes them."""
+
+
+def _entry(k: int, change: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    def changed(x: Array) -> Array:
+        out = x.copy()
+        out[..., k] = change(out[..., k])
+        return out
+
+    return changed
+
+
+def _swapped(j: int, k: int) -> Callable[[Array], Array]:
+    def changed(x: Array) -> Array:
+        out = x.copy()
+        out[..., [j, k]] = x[..., [k, j]]
+        return out
+
+    return changed
+
+
+def _on(given: dict[str, Any], name: str, change: Callable[[Array], Array]) -> dict[str, Any]:
+    x = array(given[name])
+    if x is None or isinstance(given[name], bool):
+        raise ValueError(f"{name} is no array of numbers")
+    with np.errstate(all="ignore"):
+        changed = np.asarray(change(x))
+    if not np.isfinite(changed).all() or (changed.shape == x.shape and np.array_equal(changed, x)):
+        raise ValueError("no change")
+    return {**given, name: changed.tolist()}
+
+
+def _exchanged(given: dict[str, Any], a: str, b: str) -> dict[str, Any]:
+    if np.shape(given[a]) != np.shape(given[b]) or isinstance(given[a], str | bool) or given[a] == given[b]:
+        raise ValueError("not alike")
+    return {**given, a: given[b], b: given[a]}
+
+
+def _for(given: dict[str, Any], a: str, b: str) -> dict[str, Any]:
+    if np.shape(given[a]) != np.shape(given[b]) or isinstance(given[a], str | bool) or isinstance(given[b], str | bool):
+        raise ValueError("not alike")
+    return {**given, b: given[a]}
+
+
+Change = Callable[[dict[str, Any]], dict[str, Any]]
+FAILURES = (ValueError, TypeError, KeyError, IndexError, ArithmeticError, AttributeError, np.linalg.LinAlgError)
+
+
+def _asked(evidence: Evidence, change: Change) -> Guess:
+    """The program's answer to the changed question; its answer as it was where nothing changes."""
+
+    def repair(case: Case, got: Answer) -> Answer | None:
+        try:
+            given = change(case.inputs)
+        except ValueError as error:
+            return got if str(error) == "no change" else None
+        except FAILURES:
+            return None
+        return outputs(evidence.ask(evidence.function.name, given), evidence.function)
+
+    return repair
+
+
+def _reference(evidence: Evidence, change: Change) -> Guess:
+    """The library's answer to the changed question; the right one where nothing changes."""
+
+    def formula(case: Case, got: Answer) -> Answer | None:
+        try:
+            given = change(case.inputs)
+        except ValueError as error:
+            return case.expected if str(error) == "no change" else None
+        except FAILURES:
+            return None
+        return library(evidence, given)
+
+    return formula
+
+
+def library(evidence: Evidence, given: dict[str, Any]) -> Answer | None:
+    """What this library answers, or None."""
+    from vslam_ref.conformance.adapters import itself
+
+    try:
+        with np.errstate(all="ignore"):
+            return outputs(itself.answer(evidence.function.name, given), evidence.function)
+    except Exception:  # a question that makes no sense any more
+        return None

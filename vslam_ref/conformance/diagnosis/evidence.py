@@ -1,0 +1,193 @@
+"""What is known about one function: its cases, what the program answered, and how a guess is tested.
+
+A guess is a function of a case.  It gives the answer that would be right if the guess were true (a repair of
+the program's answer, judged against the expected one), or the answer that a wrong formula gives (judged against
+the program's).  Either is tested on *all* cases: one that speaks against a guess ends it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from vslam_ref.arrays import Array
+from vslam_ref.conformance.catalogue import Function, functions
+from vslam_ref.conformance.compare import Profile, compare, numbers
+from vslam_ref.conformance.vectors_format import Case, VectorFile
+
+Answer = dict[str, Any]
+Ask = Callable[[str, dict[str, Any]], Any]
+Guess = Callable[[Case, Answer], Answer | None]
+MOST = 0.5
+"""A name explains more than this share of the failures."""
+CASES_TRIED = 60
+"""Cases of a function on which a guess is tested, failed ones and passed ones each."""
+
+
+class Judged(Protocol):
+    """A case and what became of it, as the runner has it."""
+
+    file: VectorFile
+    case: Case
+    status: Any
+    got: Any
+    cause: str
+
+    def _replace(self, **changed: Any) -> Judged:
+        """A changed copy."""
+        ...
+
+
+class Seen(NamedTuple):
+    """A case with the program's answer."""
+
+    case: Case
+    got: Answer
+
+
+class Evidence(NamedTuple):
+    """All that a program said about one function.
+
+    Attributes
+    ----------
+    function : Function
+    file : VectorFile
+    failed, passed : list of Seen
+        Cases with an answer that can be compared.
+    not_refused, refused : list of Case
+        Cases without an answer: answered all the same, and refused.
+    errors : list of Judged
+        Without a usable reply.
+    random : list of Judged
+        Statistical cases.
+    ask : callable
+        Asks the program once more: (function, inputs) -> outputs or None.
+    """
+
+    function: Function
+    file: VectorFile
+    failed: list[Seen]
+    passed: list[Seen]
+    not_refused: list[Case]
+    refused: list[Case]
+    errors: list[Judged]
+    random: list[Judged]
+    ask: Ask
+
+    @property
+    def plain(self) -> list[Seen]:
+        """Failed cases first."""
+        return [*self.failed, *self.passed]
+
+    @property
+    def wrong(self) -> int:
+        """Number of cases that went wrong, of every kind."""
+        random = sum(o.status == "failed" for o in self.random)
+        return len(self.failed) + len(self.not_refused) + len(self.errors) + random
+
+
+def gather(outcomes: Iterable[Judged], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
+    """Evidence about every function of which something went wrong."""
+    those = defaultdict(list)
+    for outcome in outcomes:
+        if outcome.status != "unsupported":
+            those[outcome.case.function].append(_in_profile(outcome, profile))
+    found = (_of(functions()[name], group, ask) for name, group in those.items() if name in functions())
+    return [evidence for evidence in found if evidence.wrong]
+
+
+def _in_profile(outcome: Judged, profile: Profile) -> Judged:
+    """The outcome with the profile's tolerance in its case."""
+    if profile == "float64":
+        return outcome
+    case = outcome.case
+    tolerance = {**case.tolerance, **case.tolerance[profile]}
+    return outcome._replace(case=case._replace(tolerance=tolerance))
+
+
+def _of(function: Function, group: list[Judged], ask: Ask) -> Evidence:
+    valid = [o for o in group if o.case.result == "valid" and o.case.statistic is None]
+    invalid = [o for o in group if o.case.result == "invalid"]
+    answered = [o for o in valid if isinstance(o.got, dict)]
+    return Evidence(
+        function,
+        group[0].file,
+        [Seen(o.case, o.got) for o in answered if o.status == "failed"],
+        [Seen(o.case, o.got) for o in answered if o.status not in ("failed", "error")],
+        [o.case for o in invalid if o.status == "failed"],
+        [o.case for o in invalid if o.status == "passed"],
+        [o for o in group if o.status == "error"],
+        [o for o in group if o.case.statistic is not None],
+        ask,
+    )
+
+
+def like(case: Case, answer: Answer | None, times: float = 10.0) -> Case:
+    """The case as if this answer were the right one, with a wider tolerance, as for known mistakes."""
+    wider = {key: times * value for key, value in case.tolerance.items() if key in ("relative", "absolute")}
+    return case._replace(expected=answer or {}, accept=[], tolerance={**case.tolerance, **wider})
+
+
+def repairs(evidence: Evidence, repair: Guess) -> int:
+    """How many failures a repair of the answer explains; 0 where a passed case speaks against it.
+
+    A passed case must stay right, too: a program whose every sign is flipped passes nothing but zeros.
+    """
+    return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)))
+
+
+def predicts(evidence: Evidence, formula: Guess) -> int:
+    """How many failures a wrong formula explains; 0 where it would have failed a passed case."""
+
+    def same(seen: Seen) -> bool | None:
+        answer = formula(seen.case, seen.got)
+        return _right(like(seen.case, answer), seen.got) if answer else None
+
+    return _count(evidence, same)
+
+
+def _count(evidence: Evidence, agrees: Callable[[Seen], bool | None]) -> int:
+    tried = spread(evidence.failed, CASES_TRIED)
+    if not tried or not any(agrees(seen) for seen in spread(tried, 5)):
+        return 0
+    count = sum(agrees(seen) is True for seen in tried)
+    if count <= MOST * len(tried):
+        return 0
+    against = any(agrees(seen) is False for seen in spread(evidence.passed, CASES_TRIED))
+    return 0 if against else round(count * len(evidence.failed) / len(tried))
+
+
+def spread(seen: list[Seen], most: int) -> list[Seen]:
+    """Some of a list, from all of it."""
+    return seen[:: max(1, -(-len(seen) // most))]
+
+
+def _right(case: Case, answer: Answer | None) -> bool:
+    if answer is None:
+        return False
+    try:
+        with np.errstate(all="ignore"):
+            return compare(case, answer).right
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError):
+        return False
+
+
+def outputs(value: Any, function: Function) -> Answer | None:
+    """Outputs by name, from the bare value where there is one."""
+    if isinstance(value, dict) and set(value) & set(function.outputs):
+        return value
+    return {next(iter(function.outputs)): value} if len(function.outputs) == 1 and value is not None else None
+
+
+def array(value: Any) -> Array | None:
+    """Numbers, or None for what is not numbers."""
+    if isinstance(value, str | dict) or value is None:
+        return None
+    try:
+        found = numbers(value)
+    except (ValueError, TypeError, RecursionError, OverflowError):
+        return None
+    return found if found.size else None
