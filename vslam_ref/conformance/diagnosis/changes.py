@@ -22,6 +22,7 @@ UNDONE: dict[str, Callable[[Array], Array]] = {
     "is taken transposed": lambda x: _square(np.swapaxes(x, -1, -2)),
     "is taken inverted": lambda x: np.linalg.inv(x) if x.ndim >= 2 else 1.0 / x,
     "is taken in degrees": np.degrees,
+    "is turned into degrees": np.radians,
     "is taken squared": np.sqrt,
     "is taken without its square root": np.square,
     "is taken in the reversed order": lambda x: _rows(x, 1)[::-1],
@@ -51,6 +52,8 @@ LOST: dict[str, Callable[[Array], Array]] = {
 }
 """What the program does to an input, where it cannot be undone."""
 MOST_ENTRIES = 12
+LARGER = 100.0
+"""No input is made larger than by this factor: a program may count up to it."""
 
 
 def _square(x: Array) -> Array:
@@ -85,6 +88,8 @@ def _angles(evidence: Evidence, name: str) -> Iterator[tuple[str, Guess]]:
         words = f"entry {k} of the input {name} is taken"
         yield f"{words} with the other sign", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, lambda y: -y)))
         yield f"{words} in degrees", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, np.degrees)))
+        turned = f"entry {k} of the input {name} is turned into degrees"
+        yield turned, _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, np.radians)))
     for j, k in combinations(range(x.size), 2):
         words = f"entries {j} and {k} of the input {name} are exchanged"
         yield words, _asked(evidence, lambda g, j=j, k=k: _on(g, name, _swapped(j, k)))
@@ -101,6 +106,7 @@ def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
                 zeroed = _entry(k, lambda y: 0.0 * y)
                 words = f"entry {k} of the input {name} is left out (as if it were zero)"
                 yield words, _reference(evidence, lambda g, n=name, z=zeroed: _on(g, n, z))
+    yield from _cut_together(evidence)
     for words, change in UNDONE.items():
         for name in evidence.function.inputs:
             yield f"the input {name} {words}", _reference(evidence, lambda g, n=name, c=UNDOES.get(words, change): _on(g, n, c))
@@ -109,8 +115,42 @@ def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
         yield f"{b} is used for {a}", _reference(evidence, lambda g, a=a, b=b: _for(g, b, a))
 
 
+def _cut_together(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Only the first of several sightings, views or points, or all but one: lists of one length are cut together."""
+    cuts = {"only the first is used": slice(1), "only the last is used": slice(-1, None), "the last is left out": slice(-1), "the first is left out": slice(1, None)}  # fmt: skip
+    several = max((s.case.inputs for s in evidence.failed), key=lambda g: sum(len(v) for v in g.values() if isinstance(v, list)))
+    lengths = {name: len(value) for name, value in several.items() if isinstance(value, list)}
+    for length in sorted(set(lengths.values())):
+        names = [name for name, n in lengths.items() if n == length]
+        for words, part in cuts.items():
+            yield f"of {', '.join(names)} {words}", _reference(evidence, lambda g, n=names, p=part: _cut(g, n, p))
+
+
+def _cut(given: dict[str, Any], names: list[str], part: slice) -> dict[str, Any]:
+    if len({len(given[name]) for name in names}) != 1:
+        raise ValueError("not alike")
+    if len(given[names[0]]) < 2:
+        raise ValueError("no change")
+    return {**given, **{name: given[name][part] for name in names}}
+
+
+def echoes(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """An input given back as an answer."""
+    for name in evidence.function.outputs:
+        for given in evidence.function.inputs:
+            yield f"{name} is the input {given}, unchanged", _echo(name, given)
+
+
+def _echo(name: str, given: str) -> Guess:
+    def formula(case: Case, got: Answer) -> Answer | None:
+        return {**case.expected, name: case.inputs[given]}
+
+    return formula
+
+
 UNDOES: dict[str, Callable[[Array], Array]] = {
     "is taken in degrees": np.radians,
+    "is turned into degrees": np.degrees,
     "is taken squared": np.square,
     "is taken without its square root": np.sqrt,
     "is taken twice as large": lambda x: 2.0 * x,
@@ -144,6 +184,8 @@ def _on(given: dict[str, Any], name: str, change: Callable[[Array], Array]) -> d
         raise ValueError(f"{name} is no array of numbers")
     with np.errstate(all="ignore"):
         changed = np.asarray(change(x))
+    if np.abs(changed).max(initial=0.0) > LARGER * max(1.0, float(np.abs(x).max(initial=0.0))):
+        raise ValueError("a loop over so many would not end")
     if not np.isfinite(changed).all() or (changed.shape == x.shape and np.array_equal(changed, x)):
         raise ValueError("no change")
     return {**given, name: changed.tolist()}

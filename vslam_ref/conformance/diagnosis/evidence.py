@@ -23,6 +23,10 @@ Ask = Callable[[str, dict[str, Any]], Any]
 Guess = Callable[[Case, Answer], Answer | None]
 MOST = 0.5
 """A name explains more than this share of the failures."""
+NEARER = 0.1
+"""An answer that explains another is nearer to it than the right one by this factor."""
+SCREENED = 3
+"""Failed cases that are looked at first."""
 CASES_TRIED = 60
 """Cases of a function on which a guess is tested, failed ones and passed ones each."""
 
@@ -139,25 +143,71 @@ def repairs(evidence: Evidence, repair: Guess) -> int:
     return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)))
 
 
+def mostly(evidence: Evidence, repair: Guess) -> int:
+    """As :func:`repairs`, where other mistakes may stand beside: an undeclared convention."""
+    return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)), share=0.0)
+
+
 def predicts(evidence: Evidence, formula: Guess) -> int:
-    """How many failures a wrong formula explains; 0 where it would have failed a passed case."""
+    """How many failures a wrong formula explains; 0 where it would have failed a passed case.
+
+    Where a formula says nothing about a case, the case speaks neither for nor against it.  A failure is explained
+    by an answer that is itself wrong, and far nearer to the program's than the right one is.
+    """
 
     def same(seen: Seen) -> bool | None:
         answer = formula(seen.case, seen.got)
-        return _right(like(seen.case, answer), seen.got) if answer else None
+        if not answer:
+            return None
+        return _right(like(seen.case, answer), seen.got)
 
-    return _count(evidence, same)
+    def explained(seen: Seen) -> bool | None:
+        answer = formula(seen.case, seen.got)
+        if not answer:
+            return None
+        if not _right(like(seen.case, answer), seen.got):
+            return False
+        if _right(seen.case, answer):
+            return False
+        far = distance(answer, seen.got) > NEARER * distance(seen.case.expected, seen.got)
+        return None if far else True
+
+    return _count(evidence, explained, same)
 
 
-def _count(evidence: Evidence, agrees: Callable[[Seen], bool | None]) -> int:
+def _count(
+    evidence: Evidence,
+    agrees: Callable[[Seen], bool | None],
+    stays: Callable[[Seen], bool | None] | None = None,
+    share: float = 1.0,
+) -> int:
+    """How many failures agree, if that is most of them and a share of those that say something; else 0."""
     tried = spread(evidence.failed, CASES_TRIED)
-    if not tried or not any(agrees(seen) for seen in spread(tried, 5)):
+    if not tried or not any(agrees(seen) for seen in spread(tried, SCREENED)):
         return 0
-    count = sum(agrees(seen) is True for seen in tried)
-    if count <= MOST * len(tried):
+    said = [agrees(seen) for seen in tried]
+    count = said.count(True)
+    if count <= MOST * len(tried) or count < share * (count + said.count(False)):
         return 0
-    against = any(agrees(seen) is False for seen in spread(evidence.passed, CASES_TRIED))
+    against = any((stays or agrees)(seen) is False for seen in spread(evidence.passed, CASES_TRIED))
     return 0 if against else round(count * len(evidence.failed) / len(tried))
+
+
+def distance(a: Answer, b: Answer) -> float:
+    """Largest difference of two answers, over the largest entry of each output; infinity where none is told."""
+    worst = 0.0
+    for name, value in a.items():
+        x, y = array(value), array(b.get(name))
+        if x is None or y is None:
+            if value != b.get(name):
+                return float("inf")
+            continue
+        if x.shape != y.shape or not np.array_equal(np.isfinite(x), np.isfinite(y)):
+            return float("inf")
+        fine = np.isfinite(x)
+        size = float(np.abs(x[fine]).max(initial=0.0)) or 1.0
+        worst = max(worst, float(np.abs(x - y)[fine].max(initial=0.0)) / size)
+    return worst
 
 
 def spread(seen: list[Seen], most: int) -> list[Seen]:
@@ -170,7 +220,7 @@ def _right(case: Case, answer: Answer | None) -> bool:
         return False
     try:
         with np.errstate(all="ignore"):
-            return compare(case, answer).right
+            return bool(compare(case, answer).right)
     except (ValueError, TypeError, KeyError, IndexError, AttributeError):
         return False
 

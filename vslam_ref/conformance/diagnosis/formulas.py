@@ -61,9 +61,15 @@ def _from_trace(R: Array) -> Array | None:
     return axis * angle / size if size > 0 else np.zeros(3)
 
 
-def _half_quaternion(R: Array) -> Array:
-    w = np.sqrt(max(1 + np.trace(R), 0.0)) / 2
-    return np.array([w, *(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4 * w))])
+def _nearest(M: Array) -> Array:
+    U, _, Vt = np.linalg.svd(M)
+    return np.asarray(U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt)
+
+
+def _log(R: Array) -> Array:
+    from vslam_ref.geometry import so3
+
+    return so3.log(R)
 
 
 def _fmod(angle: float) -> float:
@@ -103,6 +109,11 @@ FORMULAS: dict[str, dict[str, Formula]] = {
     "so3.left_jacobian_inverse": {
         "the right Jacobian's inverse is given": lambda phi, right: np.transpose(right["J"]),
         "the Jacobian itself is given": lambda phi, right: _polynomial(phi, *_weights(phi)[1:]),
+    },
+    "so3.interpolate": {
+        "entries are blended, (1 - u) a + u b: no rotation": lambda a, b, fraction, right: (1 - fraction) * a + fraction * b,
+        "entries are blended and the nearest rotation taken: not at constant speed": lambda a, b, fraction, right: _nearest((1 - fraction) * a + fraction * b),
+        "b a^T from the right: the step is that of the other side": lambda a, b, fraction, right: a @ _rotation(fraction * _log(b @ a.T)),
     },
     "se3.exp": {
         "V has the wrong sign: the right Jacobian times rho": lambda xi, right: _exp_with(xi, -_weights(xi[3:])[1], _weights(xi[3:])[2]),

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from vslam_ref.conformance.compare import Profile
 from vslam_ref.conformance.diagnosis import places, sizes
-from vslam_ref.conformance.diagnosis.changes import lost, undone
+from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
 from vslam_ref.conformance.diagnosis.declared import declared
-from vslam_ref.conformance.diagnosis.evidence import Ask, Evidence, Guess, Judged, gather, predicts, repairs
+from vslam_ref.conformance.diagnosis.evidence import Ask, Evidence, Guess, Judged, gather, mostly, predicts, repairs
+from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
 from vslam_ref.conformance.diagnosis.one_change import one_change
@@ -27,8 +28,10 @@ class Family(NamedTuple):
 
 FAMILIES = (
     Family(noted, predicts),
-    Family(declared, repairs),
+    Family(declared, mostly),
     Family(formulas, predicts),
+    Family(spoiled, predicts),
+    Family(echoes, predicts),
     Family(turns, repairs),
     Family(undone, repairs),
     Family(lost, predicts),
@@ -66,27 +69,31 @@ def name(evidence: Evidence) -> str:
 
 def _main(evidence: Evidence) -> str:
     """What explains the answers that can be compared."""
-    if odd := places.shape(evidence) or sizes.odd(evidence) or sizes.echoes(evidence):
-        return odd
     if found := _searched(evidence):
         return found
+    if odd := added_noise(evidence) or places.shape(evidence) or sizes.odd(evidence) or sizes.single(evidence):
+        return odd
     place = places.where(evidence)
     if place and (found := _searched(evidence._replace(passed=[]))):
         return f"{place}: {found}"
     if found := sizes.digits(evidence):
         return found
-    parts = [part for part in (places.entries(evidence), place) if part]
-    return ": ".join(parts[::-1])
+    parts = [part for part in (place, places.entries(evidence)) if part]
+    return ": ".join(parts)
 
 
 def _searched(evidence: Evidence) -> str:
-    """The first guess that explains most failures, and against which no case speaks."""
+    """The guess that explains all failures, or else most, and against which no case speaks."""
+    best, most = "", 0
     for family in FAMILIES:
         for sentence, guess in family.guesses(evidence):
-            if count := family.test(evidence, guess):
-                left = len(evidence.failed) - count
-                return f"{sentence} ({left} of {len(evidence.failed)} failures remain)" if left else sentence
-    return ""
+            count = family.test(evidence, guess)
+            if count > most:
+                best, most = sentence, count
+            if count == len(evidence.failed):
+                return sentence
+    left = len(evidence.failed) - most
+    return f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""
 
 
 def _unasked(evidence: Evidence) -> Iterator[str]:

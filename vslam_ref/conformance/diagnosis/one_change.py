@@ -19,6 +19,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple
 
@@ -30,6 +31,12 @@ from vslam_ref.conformance.vectors_format import Case
 ROOMS = ("vslam_ref.geometry", "vslam_ref.estimation", "vslam_ref.filters", "vslam_ref.features", "vslam_ref.grids", "vslam_ref.metrics", "vslam_ref.systems", "vslam_ref.conformance.adapters.itself")  # fmt: skip
 MOST_CHANGES = 400
 """Changes of one function of the catalogue that are tried."""
+ALL_LINES = 300_000
+"""Lines that all changes together may run for one case: the slower a function, the fewer changes are tried."""
+MOST_LINES = 100_000
+"""Lines of the library that changed code may run for one answer."""
+MOST_MEMORY = 2**30
+"""Bytes that changed code may take."""
 CALLS = {"sin": "cos", "cos": "sin", "minimum": "maximum", "maximum": "minimum", "tan": "sin", "arctan2": "arctan2"}
 LEFT_ALONE = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Compare, ast.Subscript)
 
@@ -45,13 +52,15 @@ class Change(NamedTuple):
 def one_change(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     """Wrong formulas: the library's own, with one change."""
     first = evidence.failed[0].case
-    for change in changes(ran(evidence, first))[:MOST_CHANGES]:
+    those = ran(evidence, first)
+    most = min(MOST_CHANGES, ALL_LINES // max(1, _lines(evidence, first)))
+    for change in changes(those)[:most]:
         yield change.text, _changed(evidence, change)
 
 
 def _changed(evidence: Evidence, change: Change) -> Guess:
     def guess(case: Case, got: Answer) -> Answer | None:
-        with exchanged(change.function, change.code), use_backend("numpy"):
+        with exchanged(change.function, change.code), use_backend("numpy"), bounded():
             return library(evidence, case.inputs)
 
     return guess
@@ -68,6 +77,57 @@ def exchanged(function: FunctionType, code: CodeType) -> Iterator[None]:
     finally:
         function.__code__ = before
         _forget()
+
+
+def _lines(evidence: Evidence, case: Case) -> int:
+    """How many lines of the library run for a case."""
+    with use_backend("numpy"), bounded() as left:
+        library(evidence, case.inputs)
+    return MOST_LINES - left[0]
+
+
+@contextmanager
+def bounded() -> Iterator[list[int]]:
+    """Keep changed code from running for ever, or into all memory: it fails instead, as any wrong code may."""
+    before = sys.gettrace()
+    left = [MOST_LINES]
+
+    def count(frame: Any, event: str, _: Any) -> Any:
+        if not str(frame.f_globals.get("__name__", "")).startswith(ROOMS):
+            return None
+        left[0] -= 1
+        if left[0] < 0:
+            raise RuntimeError("the changed code does not end")
+        return count
+
+    sys.settrace(count)
+    try:
+        with _memory():
+            yield left
+    finally:
+        sys.settrace(before)
+
+
+@contextmanager
+def _memory() -> Iterator[None]:
+    """At most :data:`MOST_MEMORY` more than now, where the system can tell and limit it."""
+    try:
+        import resource
+
+        pages = int(Path("/proc/self/statm").read_text("ascii").split()[0])
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    except (ImportError, OSError, ValueError):
+        yield
+        return
+    wanted = pages * resource.getpagesize() + MOST_MEMORY
+    if 0 <= soft < wanted:
+        yield
+        return
+    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def _forget() -> None:
@@ -120,6 +180,7 @@ def _of(function: FunctionType) -> list[Change]:
         return []
     if not isinstance(tree.body[0], ast.FunctionDef):
         return []
+    tree.body[0].decorator_list = []
     found = []
     for number in range(len(list(_sites(tree)))):
         changed = copy.deepcopy(tree)
@@ -216,6 +277,8 @@ def _operator(node: ast.BinOp) -> Iterator[tuple[str, Callable[[], None]]]:
         yield f"{text} were {_short(left)} alone", lambda: _become(node, left)
     if isinstance(node.op, ast.Add | ast.Sub):
         yield f"{text} were {_short(right)} alone", lambda: _become(node, right)
+        yield f"{text} were one less", lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Sub(), ast.Constant(1)))
+        yield f"{text} were one more", lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Add(), ast.Constant(1)))
     if isinstance(node.op, ast.Mult):
         yield f"{text} were {_short(right)} alone", lambda: _become(node, right)
     if isinstance(node.op, ast.MatMult):

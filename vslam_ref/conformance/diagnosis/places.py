@@ -173,12 +173,22 @@ def shape(evidence: Evidence) -> str:
             if name not in seen.got:
                 odd.append(f"the output {name} is missing")
                 break
-            if want is not None and (have is None or have.shape != want.shape):
+            if want is not None and want.ndim and (have is None or have.shape[1:] == want.shape[1:]) and _rows_vary(evidence, name):
+                rows = 0 if have is None else len(have)
+                if rows != len(want):
+                    odd.append(f"rows of {name} are {'missing' if rows < len(want) else 'too many'}")
+                    break
+            elif want is not None and (have is None or have.shape != want.shape):
                 odd.append(f"wrong shape: {name} is {_shaped(seen.got[name], have)}, expected {list(want.shape)}")
                 break
     if len(odd) <= len(evidence.failed) / 2:
         return ""
     return max(set(odd), key=odd.count)
+
+
+def _rows_vary(evidence: Evidence, name: str) -> bool:
+    """Whether the number of rows of an output is part of the answer."""
+    return len({len(seen.case.expected[name]) for seen in evidence.plain}) > 1
 
 
 def _shaped(value: Any, x: Array | None) -> str:

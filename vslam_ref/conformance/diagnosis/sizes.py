@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from vslam_ref.conformance.diagnosis.evidence import Evidence, Seen, array
+from vslam_ref.arrays import Array
+from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Seen, array, distance
 from vslam_ref.conformance.diagnosis.places import where
 
 ENOUGH = 3.0
 """Digits from which an answer counts as right with digits lost."""
-SINGLE = 2.0**-24
 
 
 def error(seen: Seen) -> float:
     """The largest error of all outputs, relative to the largest entry; infinity where nothing compares."""
-    worst = 0.0
-    for name, value in seen.case.expected.items():
-        want, have = array(value), array(seen.got.get(name))
-        if want is None and value == seen.got.get(name):
-            continue
-        if want is None or have is None or want.shape != have.shape or not np.isfinite(have).all():
-            return float("inf")
-        size = float(np.abs(want[np.isfinite(want)]).max(initial=0.0)) or 1.0
-        worst = max(worst, float(np.abs(want - have)[np.isfinite(want)].max(initial=0.0)) / size)
-    return worst
+    return distance(seen.case.expected, seen.got)
 
 
 def digits(evidence: Evidence) -> str:
@@ -34,19 +27,28 @@ def digits(evidence: Evidence) -> str:
     left = -np.log10(np.maximum(errors, 1e-300))
     if left.min() < ENOUGH:
         return ""
-    if single(evidence, errors):
-        return f"right to {_whole(left.min())} digits: it computes, or is passed on, in single precision"
     place = where(evidence) or _worst(evidence, errors)
     return f"right to {_whole(left.min())} digits, loses the others {f'in {place}' if place else 'everywhere'}".replace("in only", "only in")
 
 
-def single(evidence: Evidence, errors: np.ndarray) -> bool:
-    """Whether all numbers of the answers are of single precision, or all errors of its size."""
-    values = [array(v) for seen in evidence.failed for v in seen.got.values()]
+def single(evidence: Evidence) -> str:
+    """Whether all numbers of the answers are of single precision, though the right ones are not."""
+    have, want = (_numbers(seen.got for seen in evidence.failed), _numbers(seen.case.expected for seen in evidence.failed))
+    if have.size <= ENOUGH or want.size <= ENOUGH or not _is_single(have) or _is_single(want):
+        return ""
+    return "single precision: every number of the answers is one of 32 bits"
+
+
+def _numbers(answers: Iterable[Answer]) -> Array:
+    """All finite numbers that are not whole."""
+    values = [array(value) for answer in answers for value in answer.values()]
     x = np.concatenate([v.ravel() for v in values if v is not None] or [np.zeros(0)])
-    x = x[np.isfinite(x) & (x != np.round(x))]
+    return x[np.isfinite(x) & (x != np.round(x))]
+
+
+def _is_single(x: Array) -> bool:
     with np.errstate(over="ignore"):
-        return bool(x.size > 3 and np.array_equal(x, x.astype(np.float32).astype(np.float64)))
+        return bool(np.array_equal(x, x.astype(np.float32).astype(np.float64)))
 
 
 def _worst(evidence: Evidence, errors: np.ndarray) -> str:
@@ -69,14 +71,4 @@ def odd(evidence: Evidence) -> str:
     everything = [str(seen.got) for seen in failed]
     if len(failed) > 3 and len(set(everything)) == 1 and len({str(s.case.expected) for s in failed}) > 1:
         return "the answer is the same whatever is asked"
-    return ""
-
-
-def echoes(evidence: Evidence) -> str:
-    """An input given back as the answer."""
-    for name in evidence.function.outputs:
-        for given in evidence.function.inputs:
-            same = [seen.got.get(name) == seen.case.inputs[given] for seen in evidence.failed]
-            if sum(same) > len(same) / 2 and not isinstance(evidence.failed[0].case.inputs[given], bool | str):
-                return f"{name} is the input {given}, unchanged"
     return ""

@@ -45,11 +45,12 @@ TURNS: dict[str, Callable[[Array], Array]] = {
     "only whole turns differ: the angle is not wrapped into (-pi, pi]": lambda x: np.pi - (np.pi - x) % (2 * np.pi),
     "the last number is an angle that is not wrapped into (-pi, pi]": lambda x: _wrapped_last(x),
     "the third number is an angle that is not wrapped into (-pi, pi]": lambda x: _wrapped_third(x),
+    "the long way round: the angle is beyond pi": lambda x: _short_way(x),
     "not of unit length": lambda x: x / np.linalg.norm(x, axis=-1, keepdims=True),
     "not a rotation by its scale": lambda x: x / np.cbrt(np.linalg.det(x))[..., None, None],
-    "the rows come one after another, not as a matrix": lambda x: x.reshape(int(len(x) ** 0.5), -1),
-    "it stands in a list of its own": lambda x: x[0] if len(x) == 1 else x[:0],
-    "it is a column": lambda x: x[..., 0] if x.shape[-1] == 1 else x[:0],
+    "the rows come one after another, not as a matrix": lambda x: x.reshape(int(x.size**0.5), -1),
+    "it stands in a list of its own": lambda x: x[0] if x.shape[:1] == (1,) else x[:0],
+    "it is a column": lambda x: x[..., 0] if x.shape[-1:] == (1,) else x[:0],
     "truth is taken for falsehood": lambda x: np.where((x == 0) | (x == 1), 1 - x, np.nan),
 }
 """What is wrong -> what puts it right."""
@@ -63,6 +64,13 @@ def _part(x: Array, n: int, *, transposed: bool = False, sign: float = 1.0) -> A
     if transposed:
         out[..., :n, :n] = np.swapaxes(x[..., :n, :n], -1, -2)
     return out
+
+
+def _short_way(x: Array) -> Array:
+    size = float(np.linalg.norm(x[-3:]))
+    if x.shape != (3,) or size <= np.pi:
+        raise ValueError("no long way")
+    return x * (1 - 2 * np.pi / size)
 
 
 def _four(x: Array) -> Array:
@@ -93,7 +101,7 @@ def on_output(name: str, turn: Callable[[Array], Array]) -> Guess:
         try:
             with np.errstate(all="ignore"):
                 return {**got, name: np.asarray(turn(x)).tolist()}
-        except (ValueError, IndexError, np.linalg.LinAlgError):
+        except (ValueError, IndexError, TypeError, np.linalg.LinAlgError):
             return None
 
     return repair
@@ -119,6 +127,8 @@ def both(evidence: Evidence, name: str, most: int = 12) -> list[tuple[Array, Arr
     for seen in spread(evidence.failed, most):
         want, have = array(seen.case.expected.get(name)), array(seen.got.get(name))
         if want is not None and have is not None and want.shape == have.shape:
+            if evidence.function.outputs[name] == "quaternion" and np.vdot(want, have) < 0:
+                have = -have
             if np.isfinite(want).all() and np.isfinite(have).all():
                 found.append((want, have))
     return found
