@@ -50,7 +50,7 @@ class Fate(NamedTuple):
     @property
     def named(self) -> bool:
         """Whether the name says something."""
-        return not self.slips and self.name != NOTHING
+        return not self.slips and not self.name.startswith(NOTHING)
 
 
 def program(wrong: Wrong) -> Callable[..., Any]:
@@ -122,7 +122,7 @@ FIRST = [
     Wrong("so2.wrap", B, "return np.arctan2(np.sin(angle), np.cos(angle))", "return angle - 2 * np.pi * np.sign(angle)", "wrapped-once|whole turns"),
     Wrong("so3.interpolate", B, "return a @ so3_exp(fraction * so3_log(a.T @ b))", "return a @ so3_exp(fraction * so3_log(b.T @ a))", "a.T @ b|transposed|first factor|exchanged|fraction is taken with the other sign"),
     Wrong("so3.interpolate", B, "return a @ so3_exp(fraction * so3_log(a.T @ b))", "return (1 - fraction) * a + fraction * b", "blended"),
-    Wrong("se3.log", B, "so3_left_jacobian_inverse(phi) @ T[:3, 3]", "T[:3, 3]", "straight"),
+    Wrong("se3.log", B, "so3_left_jacobian_inverse(phi) @ T[:3, 3]", "T[:3, 3]", "straight|copied"),
     Wrong("se3.log", B, "np.concatenate([so3_left_jacobian_inverse(phi) @ T[:3, 3], phi])", "np.concatenate([phi, so3_left_jacobian_inverse(phi) @ T[:3, 3]])", "rotation_first"),
     Wrong("camera.jacobian_pose", B, "fx + fx * x**2 / z**2", "fx - fx * x**2 / z**2", r"\(0, 4\)"),
     Wrong("camera.jacobian_pose", B, "-fx * y / z]", "fx * y / z]", r"\(0, 5\)"),
@@ -147,7 +147,7 @@ FIRST = [
     Wrong("multiview.triangulate", V, "        raise ValueError(\"behind\")", "        pass", "must be refused"),
     Wrong("multiview.sampson_distance", V, "np.hypot(in_a, in_b)))", "in_a + in_b))", "nothing|sqrt|plus"),
     Wrong("camera.project", C, "G = polynomial([k1, k2, k3], q) /", "G = polynomial([k1, k2, 0 * k3], q) /", "k3|entry 8 of the input params|radtan|rational"),
-    Wrong("camera.project", C, "p2 * (q + 2 * x * x), p1 *", "p2 * (q + x * x), p1 *", "radtan|rational|x"),
+    Wrong("camera.project", C, "p2 * (q + 2 * x * x), p1 *", "p2 * (q + x * x), p1 *", "entry 0"),
     Wrong("camera.unproject", C, "ray[2] if wrong == \"not-unit\" else np.linalg.norm(ray)", "ray[2]", "not-unit|unit length"),
     Wrong("camera.project", C, "uv = params[:2] * lens(model, params[4:], X, wrong) + params[2:4]", "uv = params[:2] * lens(model, params[4:], X, wrong) + params[2:4] + 0.5", "corner|half a pixel"),
     Wrong("loss.cost", E, "else c * (a - 0.5 * c))", "else c * (a - c))", "without the half"),
@@ -204,7 +204,7 @@ SECOND = [
     Wrong("ekf.predict", F, "x[:3] += [ds * c, ds * s, turn]", "x[:3] += [ds * c, ds * s, -turn]", "entry 2 of x|minus|other sign"),
     Wrong("ekf.update", F, "P - K @ S @ K.T\n    if wrong == \"pose-only\"", "P + K @ S @ K.T\n    if wrong == \"pose-only\"", "sign|only P"),
     Wrong("ekf.update", F, "S = H @ P @ H.T + block_diag(*[cov_z] * len(ids))", "S = H @ P @ H.T + block_diag(*[cov_z + np.diag([0.09, 0.0025])] * len(ids))", "process noise as sensor noise"),
-    Wrong("ekf.update", F, "H[2 * k : 2 * k + 2, :3] = np.column_stack([-A, slope])", "H[2 * k : 2 * k + 2, :3] = np.column_stack([A, slope])", "column|sighting's Jacobian|nothing"),
+    Wrong("ekf.update", F, "H[2 * k : 2 * k + 2, :3] = np.column_stack([-A, slope])", "H[2 * k : 2 * k + 2, :3] = np.column_stack([A, slope])", "column|sighting's Jacobian|-J_landmark"),
     Wrong("ekf.augment", F, "own, cross = G @ P @ G.T + R @ cov_z @ R.T, G @ P", "own, cross = G @ P @ G.T, G @ P", "cov_z is left out"),
     Wrong("ekf.augment", F, "np.concatenate([x, x[:2] + turned])", "np.concatenate([x, turned])", "only .*x|alone"),
     Wrong("ekf.from_polar", F, "grown, along, across = np.exp(v / 2), s", "grown, along, across = np.exp(-v / 2), s", "minus|sign|only z|/ 2"),
@@ -218,8 +218,8 @@ SECOND = [
     Wrong("camera.project", C, "moved = [2 * p1 * x * y + p2 * (q + 2 * x * x), p1 * (q + 2 * y * y) + 2 * p2 * x * y]", "moved = [2 * p2 * x * y + p1 * (q + 2 * x * x), p2 * (q + 2 * y * y) + 2 * p1 * x * y]", "tangential-swapped"),
     Wrong("camera.project", C, "params[:2] * lens(model, params[4:], X, wrong) + params[2:4]", "params[0] * lens(model, params[4:], X, wrong) + params[2:4]", "params|entry 1"),
     Wrong("camera.jacobian_point", C, "    if wrong == \"depth-column-sign\":\n", "    if True:\n", "depth-column-sign|column 2"),
-    Wrong("loss.cost", E, "value = 0.5 * c * c * np.log1p(u)", "value = c * c * np.log1p(u)", "cauchy"),
-    Wrong("loss.weight", E, "    return np.where(a < c, 1 - u, 0.0) ** power", "    return np.where(a < c, 1 - u, 0.0) ** 3", "tukey"),
+    Wrong("loss.cost", E, "value = 0.5 * c * c * np.log1p(u)", "value = c * c * np.log1p(u)", "cauchy|log1p"),
+    Wrong("loss.weight", E, "    return np.where(a < c, 1 - u, 0.0) ** power", "    return np.where(a < c, 1 - u, 0.0) ** 3", "tukey|2 were 3"),
     Wrong("scale.norm", E, "    sizes = np.abs(errors) if errors.ndim == 1 else np.linalg.norm(errors, axis=1)", "    sizes = np.abs(errors) if errors.ndim == 1 else np.abs(errors).sum(axis=1)", "nothing|sum|abs"),
     Wrong("least_squares.gauss_newton_step", E, "step = -np.linalg.lstsq(J, r, rcond=None)[0]", "step = np.linalg.lstsq(J, r, rcond=None)[0]", "uphill|sign"),
     Wrong("least_squares.nielsen_factor", E, "return max(1 / 3, 1", "return max(1 / 2, 1", r"3|/ 3|above|below|nothing|constant"),

@@ -106,6 +106,11 @@ def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
                 zeroed = _entry(k, lambda y: 0.0 * y)
                 words = f"entry {k} of the input {name} is left out (as if it were zero)"
                 yield words, _reference(evidence, lambda g, n=name, z=zeroed: _on(g, n, z))
+            for j in range(min(6, x.size)):
+                for k in range(min(6, x.size)):
+                    if j != k:
+                        words = f"entry {j} of the input {name} is used for entry {k}"
+                        yield words, _reference(evidence, lambda g, n=name, c=_copied(j, k): _on(g, n, c))
     yield from _cut_together(evidence)
     for words, change in UNDONE.items():
         for name in evidence.function.inputs:
@@ -164,6 +169,15 @@ def _entry(k: int, change: Callable[[Array], Array]) -> Callable[[Array], Array]
     def changed(x: Array) -> Array:
         out = x.copy()
         out[..., k] = change(out[..., k])
+        return out
+
+    return changed
+
+
+def _copied(j: int, k: int) -> Callable[[Array], Array]:
+    def changed(x: Array) -> Array:
+        out = x.copy()
+        out[k] = x[j]
         return out
 
     return changed

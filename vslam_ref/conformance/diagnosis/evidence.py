@@ -135,21 +135,31 @@ def like(case: Case, answer: Answer | None, times: float = 10.0) -> Case:
     return case._replace(expected=answer or {}, accept=[], tolerance={**case.tolerance, **wider})
 
 
-def repairs(evidence: Evidence, repair: Guess) -> int:
-    """How many failures a repair of the answer explains; 0 where a passed case speaks against it.
+class Test(NamedTuple):
+    """How many failures a guess explains, and the passed cases that speak against it."""
+
+    count: int
+    against: list[Seen]
+
+
+NO = Test(0, [])
+
+
+def repairs(evidence: Evidence, repair: Guess) -> Test:
+    """Test a repair of the program's answer.
 
     A passed case must stay right, too: a program whose every sign is flipped passes nothing but zeros.
     """
     return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)))
 
 
-def mostly(evidence: Evidence, repair: Guess) -> int:
+def mostly(evidence: Evidence, repair: Guess) -> Test:
     """As :func:`repairs`, where other mistakes may stand beside: an undeclared convention."""
     return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)), share=0.0)
 
 
-def predicts(evidence: Evidence, formula: Guess) -> int:
-    """How many failures a wrong formula explains; 0 where it would have failed a passed case.
+def predicts(evidence: Evidence, formula: Guess) -> Test:
+    """Test a wrong formula: it would have failed no case that passed.
 
     Where a formula says nothing about a case, the case speaks neither for nor against it.  A failure is explained
     by an answer that is itself wrong, and far nearer to the program's than the right one is.
@@ -180,17 +190,17 @@ def _count(
     agrees: Callable[[Seen], bool | None],
     stays: Callable[[Seen], bool | None] | None = None,
     share: float = 1.0,
-) -> int:
-    """How many failures agree, if that is most of them and a share of those that say something; else 0."""
+) -> Test:
+    """How many failures agree, if that is most of them and a share of those that say something."""
     tried = spread(evidence.failed, CASES_TRIED)
     if not tried or not any(agrees(seen) for seen in spread(tried, SCREENED)):
-        return 0
+        return NO
     said = [agrees(seen) for seen in tried]
     count = said.count(True)
     if count <= MOST * len(tried) or count < share * (count + said.count(False)):
-        return 0
-    against = any((stays or agrees)(seen) is False for seen in spread(evidence.passed, CASES_TRIED))
-    return 0 if against else round(count * len(evidence.failed) / len(tried))
+        return NO
+    against = [seen for seen in spread(evidence.passed, CASES_TRIED) if (stays or agrees)(seen) is False]
+    return Test(round(count * len(evidence.failed) / len(tried)), against)
 
 
 def distance(a: Answer, b: Answer) -> float:

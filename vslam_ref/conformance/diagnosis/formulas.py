@@ -53,6 +53,11 @@ def _exp_with(xi: Array, p: float, q: float) -> Array:
     return _motion(_rotation(xi[3:]), _polynomial(xi[3:], p, q) @ xi[:3])
 
 
+def _log_with(T: Array, right: Any, matrix: Callable[[Array], Array]) -> Array:
+    phi = np.asarray(right["xi"], dtype=float)[3:]
+    return np.concatenate([matrix(phi) @ T[:3, 3], phi])
+
+
 def _from_trace(R: Array) -> Array | None:
     """The logarithm by arccos and the antisymmetric part, which is zero at a half turn."""
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
@@ -113,6 +118,7 @@ FORMULAS: dict[str, dict[str, Formula]] = {
     "so3.interpolate": {
         "entries are blended, (1 - u) a + u b: no rotation": lambda a, b, fraction, right: (1 - fraction) * a + fraction * b,
         "entries are blended and the nearest rotation taken: not at constant speed": lambda a, b, fraction, right: _nearest((1 - fraction) * a + fraction * b),
+        "the step is applied on the left": lambda a, b, fraction, right: _rotation(fraction * _log(a.T @ b)) @ a,
         "b a^T from the right: the step is that of the other side": lambda a, b, fraction, right: a @ _rotation(fraction * _log(b @ a.T)),
     },
     "se3.exp": {
@@ -120,7 +126,14 @@ FORMULAS: dict[str, dict[str, Formula]] = {
         "V has the wrong sign at hat(phi)^2": lambda xi, right: _exp_with(xi, _weights(xi[3:])[1], -_weights(xi[3:])[2]),
         "V is left out: t = rho": lambda xi, right: _exp_with(xi, 0.0, 0.0),
         "V is the rotation itself: t = R rho": lambda xi, right: _exp_with(xi, *_weights(xi[3:])[:2]),
+        "V's inverse is taken for V": lambda xi, right: _motion(_rotation(xi[3:]), np.linalg.inv(_polynomial(xi[3:], *_weights(xi[3:])[1:])) @ xi[:3]),
         "V lacks the term of hat(phi)^2": lambda xi, right: _exp_with(xi, _weights(xi[3:])[1], 0.0),
+    },
+    "se3.log": {
+        "V is taken for its inverse": lambda T, right: _log_with(T, right, lambda phi: _polynomial(phi, *_weights(phi)[1:])),
+        "V has the wrong sign": lambda T, right: _log_with(T, right, lambda phi: np.linalg.inv(_polynomial(-phi, *_weights(phi)[1:]))),
+        "the translation is turned back by the rotation": lambda T, right: _log_with(T, right, lambda phi: _rotation(-phi)),
+        "the translation is copied: rho = t": lambda T, right: _log_with(T, right, lambda phi: EYE),
     },
     "se3.inverse": {
         "the translation is -R t, turned forward; right is -R^T t": lambda T, right: _motion(T[:3, :3].T, -T[:3, :3] @ T[:3, 3]),

@@ -9,21 +9,24 @@ from vslam_ref.conformance.compare import Profile
 from vslam_ref.conformance.diagnosis import places, sizes
 from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
 from vslam_ref.conformance.diagnosis.declared import declared
-from vslam_ref.conformance.diagnosis.evidence import Ask, Evidence, Guess, Judged, gather, mostly, predicts, repairs
+from vslam_ref.conformance.diagnosis.evidence import Ask, Evidence, Guess, Judged, Seen, Test, gather, mostly, predicts, repairs
 from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
 from vslam_ref.conformance.diagnosis.one_change import one_change
-from vslam_ref.conformance.diagnosis.turns import turns
+from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
 
 NOTHING = "nothing that is known fits"
+"""A name that begins so says only where it is wrong."""
+FEW_PASS = 0.25
+"""Where fewer pass, for each that fails, the place of the failures says little: what passes is trivial."""
 
 
 class Family(NamedTuple):
     """Guesses of one kind, and how they are tested."""
 
     guesses: Callable[[Evidence], Iterator[tuple[str, Guess]]]
-    test: Callable[[Evidence, Guess], int]
+    test: Callable[[Evidence, Guess], Test]
 
 
 FAMILIES = (
@@ -33,6 +36,8 @@ FAMILIES = (
     Family(spoiled, predicts),
     Family(echoes, predicts),
     Family(turns, repairs),
+    Family(forward, predicts),
+    Family(scaled, repairs),
     Family(undone, repairs),
     Family(lost, predicts),
     Family(one_change, predicts),
@@ -69,31 +74,44 @@ def name(evidence: Evidence) -> str:
 
 def _main(evidence: Evidence) -> str:
     """What explains the answers that can be compared."""
-    if found := _searched(evidence):
-        return found
+    whole, part = _searched(evidence)
+    if whole:
+        return whole
     if odd := added_noise(evidence) or places.shape(evidence) or sizes.odd(evidence) or sizes.single(evidence):
         return odd
-    place = places.where(evidence)
-    if place and (found := _searched(evidence._replace(passed=[]))):
-        return f"{place}: {found}"
+    if part:
+        return part
     if found := sizes.digits(evidence):
         return found
-    parts = [part for part in (place, places.entries(evidence)) if part]
-    return ": ".join(parts)
+    place, entry = places.where(evidence), places.entries(evidence)
+    if place and len(evidence.passed) < FEW_PASS * len(evidence.failed) and not entry:
+        return f"{NOTHING}; wrong: {place}"
+    return ": ".join(part for part in (place, entry) if part)
 
 
-def _searched(evidence: Evidence) -> str:
-    """The guess that explains all failures, or else most, and against which no case speaks."""
-    best, most = "", 0
+def _searched(evidence: Evidence) -> tuple[str, str]:
+    """The guess that explains all failures, or else most; and one that explains all, though some cases escape it."""
+    best, most, partly = "", 0, ""
     for family in FAMILIES:
         for sentence, guess in family.guesses(evidence):
-            count = family.test(evidence, guess)
+            count, against = family.test(evidence, guess)
+            if against:
+                partly = partly or _part(evidence, sentence, count, against)
+                continue
             if count > most:
                 best, most = sentence, count
-            if count == len(evidence.failed):
-                return sentence
+            if count and count >= len(evidence.failed):
+                return sentence, ""
     left = len(evidence.failed) - most
-    return f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""
+    return (f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""), partly
+
+
+def _part(evidence: Evidence, sentence: str, count: int, against: list[Seen]) -> str:
+    """A guess that holds in the failed cases only: where that is, if there is a word for it."""
+    if count < len(evidence.failed) or count < places.FEWEST:
+        return ""
+    place = places.where(evidence, against)
+    return f"{place}: {sentence}" if place else f"in {count} of {count + len(evidence.passed)} cases {sentence}"
 
 
 def _unasked(evidence: Evidence) -> Iterator[str]:
@@ -103,12 +121,6 @@ def _unasked(evidence: Evidence) -> Iterator[str]:
         yield f"answers what must be refused ({some} such cases)"
     if evidence.errors:
         first = evidence.errors[0].cause.partition("\n")[0][:100]
-        lost_cases = evidence._replace(failed=[_seen(o) for o in evidence.errors], passed=evidence.plain)
+        lost_cases = evidence._replace(failed=[Seen(o.case, {}) for o in evidence.errors], passed=evidence.plain)
         place = places.where(lost_cases)
         yield f"no usable answer in {len(evidence.errors)} cases{f', {place}' if place else ''}: {first}"
-
-
-def _seen(outcome: Judged):  # type: ignore[no-untyped-def]
-    from vslam_ref.conformance.diagnosis.evidence import Seen
-
-    return Seen(outcome.case, {})

@@ -283,6 +283,7 @@ def _operator(node: ast.BinOp) -> Iterator[tuple[str, Callable[[], None]]]:
         yield f"{text} were {_short(right)} alone", lambda: _become(node, right)
     if isinstance(node.op, ast.MatMult):
         yield f"{text} had its factors exchanged", lambda: _swap(node)
+        yield f"{text} were a product of entries", lambda: setattr(node, "op", ast.Mult())
         yield f"{text} had its first factor transposed", lambda: setattr(node, "left", _transposed(left))
         yield f"{text} had its second factor transposed", lambda: setattr(node, "right", _transposed(right))
     if isinstance(node.op, ast.Pow):

@@ -14,17 +14,18 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.conformance.diagnosis.evidence import Evidence, array
-from vslam_ref.conformance.diagnosis.turns import both, places
+from vslam_ref.conformance.diagnosis.evidence import Evidence, Seen, array
+from vslam_ref.conformance.diagnosis.turns import both, numbers_of, places
 from vslam_ref.conformance.vectors_format import Case
 
 FEWEST = 3
 """Cases that a range needs on either side."""
 
 
-def where(evidence: Evidence) -> str:
-    """What the failed cases have, and no passed one; empty where there is no such thing."""
-    failed, passed = [s.case for s in evidence.failed], [s.case for s in evidence.passed]
+def where(evidence: Evidence, passed_ones: list[Seen] | None = None) -> str:
+    """What the failed cases have, and no passed one (or none of some); empty where there is no such thing."""
+    others = evidence.passed if passed_ones is None else passed_ones
+    failed, passed = [s.case for s in evidence.failed], [s.case for s in others]
     if not failed or not passed:
         return ""
     return _flags(failed, passed) or _words(failed, passed) or _ranges(failed, passed)
@@ -70,39 +71,11 @@ def _ranges(failed: list[Case], passed: list[Case]) -> str:
 
 def _features(failed: list[Case], passed: list[Case]) -> Iterator[tuple[str, Array, Array]]:
     """Numbers that both sides have: name, those of failed cases, those of passed ones."""
-    rows = [dict(_numbers(case)) for case in (*failed, *passed)]
+    rows = [dict(numbers_of(case)) for case in (*failed, *passed)]
     for name in rows[0]:
         if all(name in row for row in rows):
             values = np.array([row[name] for row in rows])
             yield name, values[: len(failed)], values[len(failed) :]
-
-
-def _numbers(case: Case) -> Iterator[tuple[str, float]]:
-    for name, value in case.inputs.items():
-        x = array(value)
-        if x is None or not np.isfinite(x).all():
-            if isinstance(value, list):
-                yield f"the number of {name}", float(len(value))
-            continue
-        if x.ndim:
-            yield f"the number of rows of {name}", float(len(x))
-        if x.ndim >= 2 and x.shape[-2:] in ((3, 3), (4, 4)):
-            yield f"the angle of {name}", _angle(x.reshape(-1, *x.shape[-2:])[0])
-        if x.ndim == 0:
-            yield f"|{name}|", abs(float(x))
-            yield name, float(x)
-        elif x.ndim == 1:
-            yield f"the length of {name}", float(np.linalg.norm(x))
-            yield from ((f"|{name}[{k}]|", abs(float(v))) for k, v in enumerate(x[:6]))
-            yield from ((f"{name}[{k}]", float(v)) for k, v in enumerate(x[:6]))
-            if x.size in (6, 7):
-                yield f"the angle of {name}", float(np.linalg.norm(x[3:6]))
-
-
-def _angle(M: Array) -> float:
-    R = M[:3, :3]
-    sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    return float(np.arctan2(np.linalg.norm(sine), (np.trace(R) - 1) / 2))
 
 
 def _between(a: float, b: float) -> str:
@@ -143,9 +116,12 @@ def _masks(evidence: Evidence, name: str) -> tuple[Array, bool] | None:
         return None
     relative = max(float(s.case.tolerance["relative"]) for s in evidence.failed)
     absolute = max(float(s.case.tolerance["absolute"]) for s in evidence.failed)
+    wants = [w for w, _ in pairs]
     masks = [np.abs(w - h) > absolute + relative * np.abs(w).max(initial=0.0) for w, h in pairs]
     if len({m.shape for m in masks}) == 1:
-        return np.any(masks, axis=0), True
+        fixed = np.ptp(np.array(wants), axis=0) == 0 if len(wants) > 1 else np.zeros(wants[0].shape, bool)
+        wrong = np.any(masks, axis=0)
+        return (np.ones_like(wrong), True) if wrong.any() and (wrong | fixed).all() else (wrong, True)
     return np.array([m.any() for m in masks]), False
 
 

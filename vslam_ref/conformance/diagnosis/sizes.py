@@ -26,9 +26,24 @@ def digits(evidence: Evidence) -> str:
         return ""
     left = -np.log10(np.maximum(errors, 1e-300))
     if left.min() < ENOUGH:
-        return ""
+        return _small(evidence)
     place = where(evidence) or _worst(evidence, errors)
     return f"right to {_whole(left.min())} digits, loses the others {f'in {place}' if place else 'everywhere'}".replace("in only", "only in")
+
+
+def _small(evidence: Evidence) -> str:
+    """Answers that are right to a fixed number, so that small ones lose all digits."""
+    worst, small = 0.0, 0.0
+    for seen in evidence.failed:
+        for name, value in seen.case.expected.items():
+            want, have = array(value), array(seen.got.get(name))
+            if want is None or have is None or want.shape != have.shape:
+                return ""
+            worst, small = max(worst, float(np.abs(want - have).max(initial=0.0))), max(small, float(np.abs(want).max(initial=0.0)))
+    if worst > 1e-5 * min(1.0, small) or small == 0:
+        return ""
+    place = where(evidence)
+    return f"small answers lose their digits (errors up to {worst:.1e}{f', {place}' if place else ''})"
 
 
 def single(evidence: Evidence) -> str:

@@ -160,6 +160,108 @@ def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[A
                 yield f"the numbers are in another order: {_order(order)}", lambda x, o=order: x[list(o)]
 
 
+FORWARD: dict[str, Callable[[Array], Array]] = {
+    "the square of the right value": lambda x: x * x,
+    "the cube of the right value": lambda x: x**3,
+    "the absolute value: its sign is lost": np.abs,
+    "negative values are cut off at zero": lambda x: np.maximum(x, 0.0),
+    "the right value cut to a whole number": np.trunc,
+    "the right value rounded to a whole number": np.round,
+    "the right value rounded down": np.floor,
+    "each angle is brought into [0, 2 pi)": lambda x: np.mod(x, 2 * np.pi),
+    "of unit length": lambda x: x / np.linalg.norm(x, axis=-1, keepdims=True),
+    "only the diagonal is right, the rest is zero": lambda x: x * np.eye(*x.shape[-2:]),
+    "the upper triangle is left at zero": np.tril,
+    "the lower triangle is left at zero": np.triu,
+    **{f"rounded to {k} decimals": (lambda x, k=k: np.round(x, k)) for k in range(2, 13)},
+}
+"""What is given in place of the right value, where it cannot be turned back."""
+
+
+def forward(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Wrong formulas: each output replaced by something that is made of the right one."""
+    for name in evidence.function.outputs:
+        head = f"{name}: " if len(evidence.function.outputs) > 1 else ""
+        for sentence, change in FORWARD.items():
+            yield head + sentence, _made(name, change)
+
+
+def _made(name: str, change: Callable[[Array], Array]) -> Guess:
+    def formula(case: Case, got: Answer) -> Answer | None:
+        x = array(case.expected.get(name))
+        if x is None:
+            return None
+        try:
+            with np.errstate(all="ignore"):
+                return {**case.expected, name: np.asarray(change(x)).tolist()}
+        except (ValueError, IndexError, TypeError, np.linalg.LinAlgError):
+            return None
+
+    return formula
+
+
+POWERS = {1.0: "multiplied by {}", -1.0: "divided by {}", 2.0: "multiplied by {}^2", -2.0: "divided by {}^2", 0.5: "multiplied by the root of {}", -0.5: "divided by the root of {}"}  # fmt: skip
+
+
+def scaled(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Repairs: an output divided or multiplied by a number of the inputs, or by how many there are."""
+    rows = [dict(numbers_of(seen.case)) for seen in spread(evidence.failed, 12)]
+    for name in evidence.function.outputs:
+        head = f"{name}: " if len(evidence.function.outputs) > 1 else ""
+        pairs = both(evidence, name)
+        ratios = np.array([np.vdot(w, h) / np.vdot(w, w) if np.vdot(w, w) > 0 else np.nan for w, h in pairs])
+        if len(pairs) != len(rows) or len(pairs) < 3 or not np.isfinite(ratios).all() or np.ptp(ratios) < 1e-9:
+            continue
+        for feature in rows[0]:
+            values = np.array([row.get(feature, np.nan) for row in rows])
+            for power, words in POWERS.items():
+                with np.errstate(all="ignore"):
+                    expected = np.sign(values) * np.abs(values) ** power
+                if np.isfinite(expected).all() and np.allclose(ratios, expected, rtol=1e-6, atol=0.0):
+                    yield head + words.format(feature), on_case(name, feature, power)
+
+
+def on_case(name: str, feature: str, power: float) -> Guess:
+    """The repair that undoes a factor of the inputs."""
+
+    def repair(case: Case, got: Answer) -> Answer | None:
+        x, value = array(got.get(name)), dict(numbers_of(case)).get(feature, 0.0)
+        if x is None or value == 0.0:
+            return None
+        return {**got, name: (x / (np.sign(value) * abs(value) ** power)).tolist()}
+
+    return repair
+
+
+def numbers_of(case: Case) -> Iterator[tuple[str, float]]:
+    """Numbers that tell a case from others: counts, sizes, angles, and single numbers of its inputs."""
+    for name, value in case.inputs.items():
+        x = array(value)
+        if x is None or not np.isfinite(x).all():
+            if isinstance(value, list):
+                yield f"the number of {name}", float(len(value))
+            continue
+        if x.ndim:
+            yield f"the number of rows of {name}", float(len(x))
+        if x.ndim >= 2 and x.shape[-2:] in ((3, 3), (4, 4)):
+            yield f"the angle of {name}", _angle(x.reshape(-1, *x.shape[-2:])[0])
+        if x.ndim == 0:
+            yield f"|{name}|", abs(float(x))
+            yield name, float(x)
+        elif x.ndim == 1:
+            yield f"the length of {name}", float(np.linalg.norm(x))
+            yield from ((f"|{name}[{k}]|", abs(float(v))) for k, v in enumerate(x[:6]))
+            yield from ((f"{name}[{k}]", float(v)) for k, v in enumerate(x[:6]))
+            if x.size in (6, 7):
+                yield f"the angle of {name}", float(np.linalg.norm(x[3:6]))
+
+
+def _angle(M: Array) -> float:
+    R = M[:3, :3]
+    sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    return float(np.arctan2(np.linalg.norm(sine), (np.trace(R) - 1) / 2))
+
+
 def _order(order: tuple[int, ...]) -> str:
     """Where the right numbers stand."""
     return ", ".join(str(k) for k in np.argsort(order))
