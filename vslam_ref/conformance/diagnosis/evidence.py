@@ -193,7 +193,12 @@ def _count(
 ) -> Test:
     """How many failures agree, if that is most of them and a share of those that say something."""
     tried = spread(evidence.failed, CASES_TRIED)
-    if not tried or not any(agrees(seen) for seen in spread(tried, SCREENED)):
+    said: list[bool | None] = []
+    for seen in spread(tried, SCREENED):
+        said.append(agrees(seen))
+        if said[-1] is False and share == 1.0:
+            return NO
+    if not any(said):
         return NO
     said = [agrees(seen) for seen in tried]
     count = said.count(True)

@@ -31,7 +31,7 @@ from vslam_ref.conformance.vectors_format import Case
 ROOMS = ("vslam_ref.geometry", "vslam_ref.estimation", "vslam_ref.filters", "vslam_ref.features", "vslam_ref.grids", "vslam_ref.metrics", "vslam_ref.systems", "vslam_ref.conformance.adapters.itself")  # fmt: skip
 MOST_CHANGES = 400
 """Changes of one function of the catalogue that are tried."""
-ALL_LINES = 300_000
+ALL_LINES = 150_000
 """Lines that all changes together may run for one case: the slower a function, the fewer changes are tried."""
 MOST_LINES = 100_000
 """Lines of the library that changed code may run for one answer."""
