@@ -10,6 +10,8 @@ from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Seen, array, distance
 from vslam_ref.conformance.diagnosis.places import where
 
+ROUNDING = 1e-13
+"""Differences, to numbers of order 1, that need no wrong formula."""
 ENOUGH = 3.0
 """Digits from which an answer counts as right with digits lost."""
 
@@ -17,6 +19,21 @@ ENOUGH = 3.0
 def error(seen: Seen) -> float:
     """The largest error of all outputs, relative to the largest entry; infinity where nothing compares."""
     return distance(seen.case.expected, seen.got)
+
+
+def rounding(evidence: Evidence) -> str:
+    """Whether nothing but the last digits differs: then no formula can be told from another."""
+    worst = 0.0
+    for seen in evidence.failed:
+        for name, value in seen.case.expected.items():
+            want, have = array(value), array(seen.got.get(name))
+            if want is None or have is None or want.shape != have.shape or not np.isfinite(want - have).all():
+                return ""
+            worst = max(worst, float(np.abs(want - have).max(initial=0.0)) / max(1.0, float(np.abs(want).max(initial=0.0))))
+    if not evidence.failed or worst > ROUNDING:
+        return ""
+    place = where(evidence)
+    return f"only the last digits differ (by up to {worst:.1e}{f', {place}' if place else ''})"
 
 
 def digits(evidence: Evidence) -> str:
@@ -84,6 +101,7 @@ def odd(evidence: Evidence) -> str:
         place = where(evidence)
         return f"the answer is not a finite number{f': {place}' if place else ''}"
     everything = [str(seen.got) for seen in failed]
+    everything += [str(seen.got) for seen in evidence.passed]
     if len(failed) > 3 and len(set(everything)) == 1 and len({str(s.case.expected) for s in failed}) > 1:
         return "the answer is the same whatever is asked"
     return ""
