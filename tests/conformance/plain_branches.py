@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Rotations and motions as programs write them: closed formulas, with a branch for small angles and half turns.
 
 Right as they stand; what is wrong is put in by ``wrong_programs``.
@@ -5,6 +6,7 @@ Right as they stand; what is wrong is put in by ``wrong_programs``.
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,11 @@ def weights(angle: float) -> tuple[float, float, float]:
     """Sin x / x, (1 - cos x)/x^2, (x - sin x)/x^3."""
     q = angle * angle
     if angle < SMALL:
-        return 1 - q / 6 + q * q / 120 - q**3 / 5040, 0.5 - q / 24 + q * q / 720 - q**3 / 40320, 1 / 6 - q / 120 + q * q / 5040
+        return (
+            1 - q / 6 + q * q / 120 - q**3 / 5040,
+            0.5 - q / 24 + q * q / 720 - q**3 / 40320,
+            1 / 6 - q / 120 + q * q / 5040,
+        )
     if angle < 0.5:
         return long_series(q)
     return np.sin(angle) / angle, 2 * np.sin(angle / 2) ** 2 / q, (angle - np.sin(angle)) / (q * angle)
@@ -157,7 +163,7 @@ def ray_cells(start: Array, end: Array) -> Array:
                 cuts.add((line - a[k]) / (b[k] - a[k]))
     t = sorted(c for c in cuts if 0 <= c <= 1)
     cells = []
-    for low, high in zip(t[:-1], t[1:]):
+    for low, high in itertools.pairwise(t):
         if high - low > 1e-13:
             cell = [int(v) for v in np.floor(a + (low + high) / 2 * (b - a))]
             if not cells or cells[-1] != cell:

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Programs with one mistake each: a change in the text of a plain program, and what its name must say.
 
 The plain programs are right and share no code with the library.  ``truth`` is a pattern: a name that does not

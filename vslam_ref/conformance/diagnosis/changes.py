@@ -8,7 +8,7 @@ answers.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,9 @@ from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess, array, outputs
 from vslam_ref.conformance.vectors_format import Case
 
-UNDONE: dict[str, Callable[[Array], Array]] = {
+Change = Callable[[dict[str, Any]], dict[str, Any]]
+
+UNDONE: dict[str, Callable[[Array], Any]] = {
     "is taken with the other sign": lambda x: -x,
     "is taken transposed": lambda x: _square(np.swapaxes(x, -1, -2)),
     "is taken inverted": lambda x: np.linalg.inv(x) if x.ndim >= 2 else 1.0 / x,
@@ -35,10 +37,12 @@ UNDONE: dict[str, Callable[[Array], Array]] = {
 }
 """What the program does to an input -> the change that undoes it."""
 
-LOST: dict[str, Callable[[Array], Array]] = {
+LOST: dict[str, Callable[[Array], Any]] = {
     "is left out (as if it were zero)": np.zeros_like,
     "is left out (as if it were one)": np.ones_like,
-    "is left out (as if it were the identity)": lambda x: np.broadcast_to(np.eye(x.shape[-1]), _square(x).shape),
+    "is left out (as if it were the identity)": lambda x: np.broadcast_to(
+        np.eye(x.shape[-1]), _square(x).shape
+    ),
     "is used by its diagonal only": lambda x: _square(x) * np.eye(x.shape[-1]),
     "is used by its size, without its sign": np.abs,
     "is used up to the last": lambda x: _rows(x, 1)[:-1],
@@ -70,73 +74,86 @@ def _rows(x: Array, dimensions: int) -> Array:
 
 def undone(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     """Repairs: the program is asked with a changed input."""
-    names = [name for name in evidence.function.inputs]
+    names = list(evidence.function.inputs)
     for name in names:
         for words, change in UNDONE.items():
-            yield f"the input {name} {words}", _asked(evidence, lambda given, n=name, c=change: _on(given, n, c))
-        yield from _angles(evidence, name)
+            yield f"the input {name} {words}", _asked(evidence, _on(name, change))
+        yield from _entries(evidence, name)
     for a, b in combinations(names, 2):
-        yield f"the inputs {a} and {b} are exchanged", _asked(evidence, lambda given, a=a, b=b: _exchanged(given, a, b))
+        yield f"the inputs {a} and {b} are exchanged", _asked(evidence, _both(a, b, back=True))
 
 
-def _angles(evidence: Evidence, name: str) -> Iterator[tuple[str, Guess]]:
-    """One entry of a short input: its sign, its unit."""
-    x = array(evidence.failed[0].case.inputs.get(name))
-    if x is None or x.ndim != 1 or not 2 <= x.size <= MOST_ENTRIES:
-        return
-    for k in range(x.size):
-        words = f"entry {k} of the input {name} is taken"
-        yield f"{words} with the other sign", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, lambda y: -y)))
-        yield f"{words} in degrees", _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, np.degrees)))
-        turned = f"entry {k} of the input {name} is turned into degrees"
-        yield turned, _asked(evidence, lambda g, k=k: _on(g, name, _entry(k, np.radians)))
-    for j, k in combinations(range(x.size), 2):
+def _entries(evidence: Evidence, name: str) -> Iterator[tuple[str, Guess]]:
+    """One entry of a short input: its sign, its unit; two exchanged."""
+    size = _short(evidence, name)
+    for k in range(size):
+        entry = f"entry {k} of the input {name} is"
+        yield f"{entry} taken with the other sign", _asked(evidence, _on(name, _entry(k, np.negative)))
+        yield f"{entry} taken in degrees", _asked(evidence, _on(name, _entry(k, np.degrees)))
+        yield f"{entry} turned into degrees", _asked(evidence, _on(name, _entry(k, np.radians)))
+    for j, k in combinations(range(size), 2):
         words = f"entries {j} and {k} of the input {name} are exchanged"
-        yield words, _asked(evidence, lambda g, j=j, k=k: _on(g, name, _swapped(j, k)))
+        yield words, _asked(evidence, _on(name, _moved([j, k], [k, j])))
+
+
+def _short(evidence: Evidence, name: str) -> int:
+    """Number of entries of a short list of numbers, else 0."""
+    x = array(evidence.failed[0].case.inputs.get(name))
+    return x.size if x is not None and x.ndim == 1 and 2 <= x.size <= MOST_ENTRIES else 0
 
 
 def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
-    """Wrong formulas: the library's answer where an input, or an entry of one, is lost."""
-    for name in evidence.function.inputs:
+    """Wrong formulas: the library's answer where an input, or an entry of one, is lost or changed."""
+    names = list(evidence.function.inputs)
+    for name in names:
         for words, change in LOST.items():
-            yield f"the input {name} {words}", _reference(evidence, lambda g, n=name, c=change: _on(g, n, c))
-        x = array(evidence.failed[0].case.inputs.get(name))
-        if x is not None and x.ndim == 1 and 2 <= x.size <= MOST_ENTRIES:
-            for k in range(x.size):
-                zeroed = _entry(k, lambda y: 0.0 * y)
-                words = f"entry {k} of the input {name} is left out (as if it were zero)"
-                yield words, _reference(evidence, lambda g, n=name, z=zeroed: _on(g, n, z))
-            for j in range(min(6, x.size)):
-                for k in range(min(6, x.size)):
-                    if j != k:
-                        words = f"entry {j} of the input {name} is used for entry {k}"
-                        yield words, _reference(evidence, lambda g, n=name, c=_copied(j, k): _on(g, n, c))
+            yield f"the input {name} {words}", _reference(evidence, _on(name, change))
+        size = _short(evidence, name)
+        for k in range(size):
+            words = f"entry {k} of the input {name} is left out (as if it were zero)"
+            yield words, _reference(evidence, _on(name, _entry(k, np.zeros_like)))
+        for j, k in permutations(range(min(6, size)), 2):
+            words = f"entry {j} of the input {name} is used for entry {k}"
+            yield words, _reference(evidence, _on(name, _moved([j], [k])))
     yield from _cut_together(evidence)
     for words, change in UNDONE.items():
-        for name in evidence.function.inputs:
-            yield f"the input {name} {words}", _reference(evidence, lambda g, n=name, c=UNDOES.get(words, change): _on(g, n, c))
-    for a, b in combinations(evidence.function.inputs, 2):
-        yield f"{a} is used for {b}", _reference(evidence, lambda g, a=a, b=b: _for(g, a, b))
-        yield f"{b} is used for {a}", _reference(evidence, lambda g, a=a, b=b: _for(g, b, a))
+        for name in names:
+            yield f"the input {name} {words}", _reference(evidence, _on(name, UNDOES.get(words, change)))
+    for a, b in permutations(names, 2):
+        yield f"{a} is used for {b}", _reference(evidence, _both(a, b, back=False))
+
+
+CUTS = {
+    "only the first is used": slice(1),
+    "only the last is used": slice(-1, None),
+    "the last is left out": slice(-1),
+    "the first is left out": slice(1, None),
+}
 
 
 def _cut_together(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
-    """Only the first of several sightings, views or points, or all but one: lists of one length are cut together."""
-    cuts = {"only the first is used": slice(1), "only the last is used": slice(-1, None), "the last is left out": slice(-1), "the first is left out": slice(1, None)}  # fmt: skip
-    several = max((s.case.inputs for s in evidence.failed), key=lambda g: sum(len(v) for v in g.values() if isinstance(v, list)))
+    """Only the first of several sightings, views or points, or all but one: lists of one length together."""
+    several = max((seen.case.inputs for seen in evidence.failed), key=_rows_in_all)
     lengths = {name: len(value) for name, value in several.items() if isinstance(value, list)}
     for length in sorted(set(lengths.values())):
         names = [name for name, n in lengths.items() if n == length]
-        for words, part in cuts.items():
-            yield f"of {', '.join(names)} {words}", _reference(evidence, lambda g, n=names, p=part: _cut(g, n, p))
+        for words, part in CUTS.items():
+            yield f"of {', '.join(names)} {words}", _reference(evidence, _cut(names, part))
 
 
-def _cut(given: dict[str, Any], names: list[str], part: slice) -> dict[str, Any]:
-    if len({len(given[name]) for name in names}) != 1:
-        raise ValueError("not alike")
-    if len(given[names[0]]) < 2:
-        raise ValueError("no change")
-    return {**given, **{name: given[name][part] for name in names}}
+def _rows_in_all(given: dict[str, Any]) -> int:
+    return sum(len(value) for value in given.values() if isinstance(value, list))
+
+
+def _cut(names: list[str], part: slice) -> Change:
+    def changed(given: dict[str, Any]) -> dict[str, Any]:
+        if len({len(given[name]) for name in names}) != 1:
+            raise ValueError("not alike")
+        if len(given[names[0]]) < 2:
+            raise ValueError("no change")
+        return {**given, **{name: given[name][part] for name in names}}
+
+    return changed
 
 
 def echoes(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
@@ -153,7 +170,7 @@ def _echo(name: str, given: str) -> Guess:
     return formula
 
 
-UNDOES: dict[str, Callable[[Array], Array]] = {
+UNDOES: dict[str, Callable[[Array], Any]] = {
     "is taken in degrees": np.radians,
     "is turned into degrees": np.degrees,
     "is taken squared": np.square,
@@ -165,7 +182,7 @@ UNDOES: dict[str, Callable[[Array], Array]] = {
 """The changes that are not their own way back, as the program makes them."""
 
 
-def _entry(k: int, change: Callable[[Array], Array]) -> Callable[[Array], Array]:
+def _entry(k: int, change: Callable[[Array], Any]) -> Callable[[Array], Any]:
     def changed(x: Array) -> Array:
         out = x.copy()
         out[..., k] = change(out[..., k])
@@ -174,51 +191,53 @@ def _entry(k: int, change: Callable[[Array], Array]) -> Callable[[Array], Array]
     return changed
 
 
-def _copied(j: int, k: int) -> Callable[[Array], Array]:
+def _moved(where: list[int], whence: list[int]) -> Callable[[Array], Any]:
+    """Entries ``whence`` become those that stand at ``where``."""
+
     def changed(x: Array) -> Array:
         out = x.copy()
-        out[k] = x[j]
+        out[..., whence] = x[..., where]
         return out
 
     return changed
 
 
-def _swapped(j: int, k: int) -> Callable[[Array], Array]:
-    def changed(x: Array) -> Array:
-        out = x.copy()
-        out[..., [j, k]] = x[..., [k, j]]
-        return out
+def _on(name: str, change: Callable[[Array], Any]) -> Change:
+    """One input changed."""
+
+    def changed(given: dict[str, Any]) -> dict[str, Any]:
+        x = array(given[name])
+        if x is None or isinstance(given[name], bool):
+            raise ValueError(f"{name} is no array of numbers")
+        with np.errstate(all="ignore"):
+            other = np.asarray(change(x))
+        if np.abs(other).max(initial=0.0) > LARGER * max(1.0, float(np.abs(x).max(initial=0.0))):
+            raise ValueError("a loop over so many would not end")
+        if not np.isfinite(other).all() or (other.shape == x.shape and np.array_equal(other, x)):
+            raise ValueError("no change")
+        return {**given, name: other.tolist()}
 
     return changed
 
 
-def _on(given: dict[str, Any], name: str, change: Callable[[Array], Array]) -> dict[str, Any]:
-    x = array(given[name])
-    if x is None or isinstance(given[name], bool):
-        raise ValueError(f"{name} is no array of numbers")
-    with np.errstate(all="ignore"):
-        changed = np.asarray(change(x))
-    if np.abs(changed).max(initial=0.0) > LARGER * max(1.0, float(np.abs(x).max(initial=0.0))):
-        raise ValueError("a loop over so many would not end")
-    if not np.isfinite(changed).all() or (changed.shape == x.shape and np.array_equal(changed, x)):
-        raise ValueError("no change")
-    return {**given, name: changed.tolist()}
+def _both(a: str, b: str, *, back: bool) -> Change:
+    """Input a in the place of b, and on demand b in that of a."""
+
+    def changed(given: dict[str, Any]) -> dict[str, Any]:
+        words = any(isinstance(given[name], str | bool) for name in (a, b))
+        if words or np.shape(given[a]) != np.shape(given[b]):
+            raise ValueError("not alike")
+        if given[a] == given[b]:
+            raise ValueError("no change")
+        return {**given, b: given[a], **({a: given[b]} if back else {})}
+
+    return changed
 
 
-def _exchanged(given: dict[str, Any], a: str, b: str) -> dict[str, Any]:
-    if np.shape(given[a]) != np.shape(given[b]) or isinstance(given[a], str | bool) or given[a] == given[b]:
-        raise ValueError("not alike")
-    return {**given, a: given[b], b: given[a]}
-
-
-def _for(given: dict[str, Any], a: str, b: str) -> dict[str, Any]:
-    if np.shape(given[a]) != np.shape(given[b]) or isinstance(given[a], str | bool) or isinstance(given[b], str | bool):
-        raise ValueError("not alike")
-    return {**given, b: given[a]}
-
-
-Change = Callable[[dict[str, Any]], dict[str, Any]]
-FAILURES = (ValueError, TypeError, KeyError, IndexError, ArithmeticError, AttributeError, np.linalg.LinAlgError)
+FAILURES = (
+    *(ValueError, TypeError, KeyError, IndexError, ArithmeticError, AttributeError),
+    np.linalg.LinAlgError,
+)
 
 
 def _asked(evidence: Evidence, change: Change) -> Guess:

@@ -19,7 +19,9 @@ MOST_TOGETHER = 4
 def choices() -> dict[str, tuple[Any, ...]]:
     """What a program may declare: name -> values, the house's first."""
     hints = {name: get_args(hint) for name, hint in get_type_hints(Convention).items()}
-    return {name: values for name, values in hints.items() if name in Convention.__dataclass_fields__ and values}
+    return {
+        name: values for name, values in hints.items() if name in Convention.__dataclass_fields__ and values
+    }
 
 
 def declared(evidence: Evidence) -> Iterator[tuple[str, Guess]]:

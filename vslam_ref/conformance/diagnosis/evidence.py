@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """What is known about one function: its cases, what the program answered, and how a guess is tested.
 
 A guess is a function of a case.  It gives the answer that would be right if the guess were true (a repair of
@@ -90,7 +91,7 @@ class Evidence(NamedTuple):
     def wrong(self) -> int:
         """Number of cases that went wrong, of every kind."""
         random = sum(o.status == "failed" for o in self.random)
-        return len(self.failed) + len(self.not_refused) + len(self.errors) + random
+        return int(len(self.failed) + len(self.not_refused) + len(self.errors) + random)
 
 
 def gather(outcomes: Iterable[Judged], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
@@ -138,7 +139,7 @@ def like(case: Case, answer: Answer | None, times: float = 10.0) -> Case:
 class Test(NamedTuple):
     """How many failures a guess explains, and the passed cases that speak against it."""
 
-    count: int
+    explained: int
     against: list[Seen]
 
 

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """EKF-SLAM with one entry of one Jacobian spoiled: a sign in F, a zero in H, a noise turned the wrong way.
 
 ::
@@ -69,7 +70,12 @@ def _turned(letter: str) -> Spoil:
 
 
 def _of(function: str, spoil: Spoil) -> Guess:
-    formula = {"ekf.predict": predict, "ekf.update": update, "ekf.augment": augment}[function]
+    steps: dict[str, Callable[..., dict[str, Array]]] = {
+        "ekf.predict": predict,
+        "ekf.update": update,
+        "ekf.augment": augment,
+    }
+    formula = steps[function]
 
     def guess(case: Case, got: Answer) -> Answer | None:
         try:
@@ -87,13 +93,17 @@ def _wrapped(x: Array) -> Array:
     return x
 
 
-def predict(spoil: Spoil, x: Any, P: Any, control: Any, cov_u: Any, wheelbase: Any, dt: Any) -> dict[str, Array]:
+def predict(
+    spoil: Spoil, x: Any, P: Any, control: Any, cov_u: Any, wheelbase: Any, dt: Any
+) -> dict[str, Array]:
     """One prediction, with its Jacobians as they are spoiled."""
     (v, steering), (c, s), n = control, (np.cos(x[2]), np.sin(x[2])), len(x)
     ahead, tan = v * dt, np.tan(steering)
     F, G = np.eye(n), np.zeros((n, 2))
     F[:3, :3] = spoil("F", np.array([[1, 0, -ahead * s], [0, 1, ahead * c], [0, 0, 1]]))
-    G[:3] = spoil("G", np.array([[dt * c, 0], [dt * s, 0], [dt * tan / wheelbase, ahead * (1 + tan**2) / wheelbase]]))
+    G[:3] = spoil(
+        "G", np.array([[dt * c, 0], [dt * s, 0], [dt * tan / wheelbase, ahead * (1 + tan**2) / wheelbase]])
+    )
     moved = x.copy()
     moved[:3] += ahead * c, ahead * s, ahead * tan / wheelbase
     return {"x": _wrapped(moved), "P": F @ P @ F.T + G @ cov_u @ G.T}
@@ -151,14 +161,15 @@ def added_noise(evidence: Evidence) -> str:
 
 def _block(seen: Seen) -> Array | None:
     """What is in S beside H P H^T and cov_z, for one sighting."""
-    given = {name: array(value) for name, value in seen.case.inputs.items()}
-    after = array(seen.got.get("P"))
-    x, P, ids, z, cov_z = (given[name] for name in ("x", "P", "ids", "z", "cov_z"))
-    if any(v is None for v in (x, P, ids, z, cov_z, after)) or len(ids) != 1 or after.shape != P.shape:  # type: ignore[arg-type, union-attr]
+    given: dict[str, Any] = {name: array(value) for name, value in seen.case.inputs.items()}
+    after: Any = array(seen.got.get("P"))
+    if any(value is None for value in given.values()) or len(given["ids"]) != 1 or after is None:
+        return None
+    if after.shape != given["P"].shape:
         return None
     try:
-        H, _ = stacked(lambda _, J: J, x, ids, z)  # type: ignore[arg-type]
-        A = H @ P @ H.T
-        return np.asarray(A @ np.linalg.inv(H @ (P - after) @ H.T) @ A - A - cov_z)
+        H, _ = stacked(lambda _, J: J, given["x"], given["ids"], given["z"])
+        A = H @ given["P"] @ H.T
+        return np.asarray(A @ np.linalg.inv(H @ (given["P"] - after) @ H.T) @ A - A - given["cov_z"])
     except FAILURES:
         return None

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Well-known wrong formulas that the vectors themselves do not carry, each with its sentence.
 
 A formula gets the inputs as arrays and gives what a program with this mistake answers; where it gives None,
@@ -33,7 +34,10 @@ def _weights(phi: Array) -> tuple[float, float, float]:
     """Sin x / x, (1 - cos x)/x^2, (x - sin x)/x^3, to rounding."""
     x = float(np.linalg.norm(phi))
     if x < 0.3:
-        terms = [(-1) ** k * x ** (2 * k) / np.cumprod(np.arange(1.0, 2 * k + 4))[[2 * k, 2 * k + 1, 2 * k + 2]] for k in range(9)]
+        terms = [
+            (-1) ** k * x ** (2 * k) / np.cumprod(np.arange(1.0, 2 * k + 4))[[2 * k, 2 * k + 1, 2 * k + 2]]
+            for k in range(9)
+        ]
         a, b, c = np.sum(terms, axis=0)
         return float(a), float(b), float(c)
     return np.sin(x) / x, 2 * (np.sin(x / 2) / x) ** 2, (x - np.sin(x)) / x**3
@@ -53,7 +57,7 @@ def _exp_with(xi: Array, p: float, q: float) -> Array:
     return _motion(_rotation(xi[3:]), _polynomial(xi[3:], p, q) @ xi[:3])
 
 
-def _log_with(T: Array, right: Any, matrix: Callable[[Array], Array]) -> Array:
+def _log_with(T: Array, right: Any, matrix: Callable[[Array], Any]) -> Array:
     phi = np.asarray(right["xi"], dtype=float)[3:]
     return np.concatenate([matrix(phi) @ T[:3, 3], phi])
 
@@ -190,7 +194,7 @@ FORMULAS: dict[str, dict[str, Formula]] = {
 def _by_sine(R: Array) -> Array | None:
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
     size = np.linalg.norm(axis)
-    return axis * np.arcsin(min(size, 1.0)) / size if size > 0 else None
+    return axis * np.arcsin(min(float(size), 1.0)) / size if size > 0 else None
 
 
 def _huber(name: str, c: float, x: Array, beyond: Callable[[Array], Array]) -> Array | None:
@@ -222,7 +226,10 @@ def formulas(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
 
 def _of(evidence: Evidence, formula: Formula) -> Guess:
     def guess(case: Case, got: Answer) -> Answer | None:
-        given = {k: v if isinstance(v, str | bool) or array(v) is None else array(v) for k, v in case.inputs.items()}
+        given = {
+            k: v if isinstance(v, str | bool) or array(v) is None else array(v)
+            for k, v in case.inputs.items()
+        }
         try:
             with np.errstate(all="ignore"):
                 found = formula(**given, right=case.expected)

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """One name for each function that fails: the most particular guess that all its cases bear out."""
 
 from __future__ import annotations
@@ -9,7 +10,18 @@ from vslam_ref.conformance.compare import Profile
 from vslam_ref.conformance.diagnosis import places, sizes
 from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
 from vslam_ref.conformance.diagnosis.declared import declared
-from vslam_ref.conformance.diagnosis.evidence import Ask, Evidence, Guess, Judged, Seen, Test, gather, mostly, predicts, repairs
+from vslam_ref.conformance.diagnosis.evidence import (
+    Ask,
+    Evidence,
+    Guess,
+    Judged,
+    Seen,
+    Test,
+    gather,
+    mostly,
+    predicts,
+    repairs,
+)
 from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
@@ -79,7 +91,12 @@ def _main(evidence: Evidence) -> str:
     whole, part = _searched(evidence)
     if whole:
         return whole
-    if odd := added_noise(evidence) or places.shape(evidence) or sizes.odd(evidence) or sizes.single(evidence):
+    if (
+        odd := added_noise(evidence)
+        or places.shape(evidence)
+        or sizes.odd(evidence)
+        or sizes.single(evidence)
+    ):
         return odd
     if part:
         return part
@@ -113,7 +130,9 @@ def _part(evidence: Evidence, sentence: str, count: int, against: list[Seen]) ->
     if count < len(evidence.failed) or count < places.FEWEST:
         return ""
     place = places.where(evidence, against)
-    return f"{place}: {sentence}" if place else f"in {count} of {count + len(evidence.passed)} cases {sentence}"
+    return (
+        f"{place}: {sentence}" if place else f"in {count} of {count + len(evidence.passed)} cases {sentence}"
+    )
 
 
 def _unasked(evidence: Evidence) -> Iterator[str]:
@@ -123,6 +142,8 @@ def _unasked(evidence: Evidence) -> Iterator[str]:
         yield f"answers what must be refused ({some} such cases)"
     if evidence.errors:
         first = evidence.errors[0].cause.partition("\n")[0][:100]
-        lost_cases = evidence._replace(failed=[Seen(o.case, {}) for o in evidence.errors], passed=evidence.plain)
+        lost_cases = evidence._replace(
+            failed=[Seen(o.case, {}) for o in evidence.errors], passed=evidence.plain
+        )
         place = places.where(lost_cases)
         yield f"no usable answer in {len(evidence.errors)} cases{f', {place}' if place else ''}: {first}"

@@ -45,7 +45,7 @@ def random_note(evidence: Evidence) -> Iterator[str]:
 def _agreed(random: list[Judged], note: str) -> bool:
     """Whether every case that carries a note has it, and one of them at least."""
     carry = [o for o in random if note in (o.case.statistic or {}).get("mistakes", {})]
-    single = [o._replace(case=_only(o.case, note)) for o in carry]  # type: ignore[attr-defined]
+    single = [o._replace(case=_only(o.case, note)) for o in carry]
     return bool(carry) and all(isinstance(o.got, dict) and mistaken(o.case, o.got) == note for o in single)
 
 

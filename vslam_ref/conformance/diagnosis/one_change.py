@@ -1,4 +1,5 @@
-"""The library with one sign changed: does it give the program's answers?
+# ruff: noqa: E501
+"""The library with one sign changed, asked whether it answers as the program does.
 
 Every function that the library runs for an answer is changed in one place at a time: plus for minus, sine for
 cosine, a transpose left out, two factors exchanged, a factor doubled, a power or a minus sign left out.  If the
@@ -37,14 +38,21 @@ MOST_LINES = 100_000
 """Lines of the library that changed code may run for one answer."""
 MOST_MEMORY = 2**30
 """Bytes that changed code may take."""
-CALLS = {"sin": "cos", "cos": "sin", "minimum": "maximum", "maximum": "minimum", "tan": "sin", "arctan2": "arctan2"}
+CALLS = {
+    "sin": "cos",
+    "cos": "sin",
+    "minimum": "maximum",
+    "maximum": "minimum",
+    "tan": "sin",
+    "arctan2": "arctan2",
+}
 LEFT_ALONE = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Compare, ast.Subscript)
 
 
 class Change(NamedTuple):
     """One changed line: the function, its new code, and what is said of it."""
 
-    function: FunctionType
+    target: Any
     code: CodeType
     text: str
 
@@ -60,7 +68,7 @@ def one_change(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
 
 def _changed(evidence: Evidence, change: Change) -> Guess:
     def guess(case: Case, got: Answer) -> Answer | None:
-        with exchanged(change.function, change.code), use_backend("numpy"), bounded():
+        with exchanged(change.target, change.code), use_backend("numpy"), bounded():
             return library(evidence, case.inputs)
 
     return guess
@@ -204,7 +212,9 @@ def _cut(line: str, most: int = 90) -> str:
 
 def _statement(tree: ast.Module, line: int) -> ast.stmt:
     """The innermost statement at a line."""
-    those = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= line <= (n.end_lineno or line)]
+    those = [
+        n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= line <= (n.end_lineno or line)
+    ]
     return those[-1]
 
 
@@ -226,7 +236,9 @@ Site = tuple[ast.expr | ast.stmt, tuple[str, Callable[[], None]]]
 def _sites(tree: ast.AST) -> Iterator[Site]:
     """Every place that can be changed, in the order of the text, and what is done there."""
     for node in ast.iter_child_nodes(tree):
-        if isinstance(node, LEFT_ALONE) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
+        if isinstance(node, LEFT_ALONE) or (
+            isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        ):
             continue
         if isinstance(node, ast.arguments):
             continue
@@ -260,13 +272,22 @@ def _at(node: ast.expr) -> Iterator[tuple[str, Callable[[], None]]]:
         yield from _call(node)
     elif isinstance(node, ast.Attribute) and node.attr == "T":
         yield f"{_short(node)} were not transposed", lambda: _become(node, node.value)
-    elif isinstance(node, ast.Constant) and type(node.value) in (int, float) and node.value not in (0, True):
-        value = node.value
-        if isinstance(value, float) or value > 1:
-            yield f"{value} were {value * 2}", lambda: setattr(node, "value", value * 2)
-            yield f"{value} were {value / 2}", lambda: setattr(node, "value", value / 2)
-            yield f"{value} were {value + 1}", lambda: setattr(node, "value", value + 1)
-            yield f"{value} were {value - 1}", lambda: setattr(node, "value", value - 1)
+    elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        yield from _constant(node, float(node.value))  # type: ignore[arg-type]
+
+
+def _constant(node: ast.Constant, value: float) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Doubled, halved, one more, one less; 0 and the whole number 1 are mostly counts."""
+    whole = isinstance(node.value, int)
+    if value == 0 or (whole and value <= 1):
+        return
+    kind = int if whole else float
+    for other in (2 * value, value / 2, value + 1, value - 1):
+        if other == kind(other):
+            yield (
+                f"{node.value!r} were {kind(other)!r}",
+                functools.partial(setattr, node, "value", kind(other)),
+            )
 
 
 def _operator(node: ast.BinOp) -> Iterator[tuple[str, Callable[[], None]]]:
@@ -277,8 +298,14 @@ def _operator(node: ast.BinOp) -> Iterator[tuple[str, Callable[[], None]]]:
         yield f"{text} were {_short(left)} alone", lambda: _become(node, left)
     if isinstance(node.op, ast.Add | ast.Sub):
         yield f"{text} were {_short(right)} alone", lambda: _become(node, right)
-        yield f"{text} were one less", lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Sub(), ast.Constant(1)))
-        yield f"{text} were one more", lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Add(), ast.Constant(1)))
+        yield (
+            f"{text} were one less",
+            lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Sub(), ast.Constant(1))),
+        )
+        yield (
+            f"{text} were one more",
+            lambda: _become(node, ast.BinOp(copy.deepcopy(node), ast.Add(), ast.Constant(1))),
+        )
     if isinstance(node.op, ast.Mult):
         yield f"{text} were {_short(right)} alone", lambda: _become(node, right)
     if isinstance(node.op, ast.MatMult):
@@ -296,7 +323,10 @@ def _call(node: ast.Call) -> Iterator[tuple[str, Callable[[], None]]]:
         func = node.func
         yield f"{_short(node)} were {CALLS[name]}", lambda: setattr(func, "attr", CALLS[name])
     if name in ("cross", "arctan2", "einsum", "times", "matmul") and len(node.args) >= 2 and name != "einsum":
-        yield f"{_short(node)} had its arguments exchanged", lambda: node.args.__setitem__(slice(0, 2), node.args[1::-1])
+        yield (
+            f"{_short(node)} had its arguments exchanged",
+            lambda: node.args.__setitem__(slice(0, 2), node.args[1::-1]),
+        )
     if name in ("transpose", "swapaxes", "sqrt", "abs", "inv") and node.args:
         yield f"{name} were left out of {_short(node)}", lambda: _become(node, node.args[0])
 
@@ -304,7 +334,7 @@ def _call(node: ast.Call) -> Iterator[tuple[str, Callable[[], None]]]:
 def _become(node: ast.expr, other: ast.expr) -> None:
     """Turn a node into +other, in place."""
     copied = copy.deepcopy(other)
-    node.__class__ = ast.UnaryOp  # type: ignore[assignment]
+    node.__class__ = ast.UnaryOp
     node.__dict__.clear()
     node.__dict__.update(vars(ast.copy_location(ast.UnaryOp(ast.UAdd(), copied), copied)))
 

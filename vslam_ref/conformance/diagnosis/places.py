@@ -136,7 +136,9 @@ def _how(evidence: Evidence, name: str, wrong: Array) -> str:
         return ", left at zero,"
     ratio = have[big] / want[big]
     if np.ptp(ratio) < 1e-6 * abs(ratio[0]):
-        return ", of the other sign," if abs(ratio[0] + 1) < 1e-6 else f", {ratio[0]:.6g} times the right value,"
+        return (
+            ", of the other sign," if abs(ratio[0] + 1) < 1e-6 else f", {ratio[0]:.6g} times the right value,"
+        )
     return ""
 
 
@@ -149,13 +151,20 @@ def shape(evidence: Evidence) -> str:
             if name not in seen.got:
                 odd.append(f"the output {name} is missing")
                 break
-            if want is not None and want.ndim and (have is None or have.shape[1:] == want.shape[1:]) and _rows_vary(evidence, name):
+            if (
+                want is not None
+                and want.ndim
+                and (have is None or have.shape[1:] == want.shape[1:])
+                and _rows_vary(evidence, name)
+            ):
                 rows = 0 if have is None else len(have)
                 if rows != len(want):
                     odd.append(f"rows of {name} are {'missing' if rows < len(want) else 'too many'}")
                     break
             elif want is not None and (have is None or have.shape != want.shape):
-                odd.append(f"wrong shape: {name} is {_shaped(seen.got[name], have)}, expected {list(want.shape)}")
+                odd.append(
+                    f"wrong shape: {name} is {_shaped(seen.got[name], have)}, expected {list(want.shape)}"
+                )
                 break
     if len(odd) <= len(evidence.failed) / 2:
         return ""

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """How wrong is it?  Digits that are left, and how the error grows; answers that are no numbers, or always the same."""
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ def rounding(evidence: Evidence) -> str:
             want, have = array(value), array(seen.got.get(name))
             if want is None or have is None or want.shape != have.shape or not np.isfinite(want - have).all():
                 return ""
-            worst = max(worst, float(np.abs(want - have).max(initial=0.0)) / max(1.0, float(np.abs(want).max(initial=0.0))))
+            worst = max(
+                worst,
+                float(np.abs(want - have).max(initial=0.0)) / max(1.0, float(np.abs(want).max(initial=0.0))),
+            )
     if not evidence.failed or worst > ROUNDING:
         return ""
     place = where(evidence)
@@ -45,7 +49,9 @@ def digits(evidence: Evidence) -> str:
     if left.min() < ENOUGH:
         return _small(evidence)
     place = where(evidence) or _worst(evidence, errors)
-    return f"right to {_whole(left.min())} digits, loses the others {f'in {place}' if place else 'everywhere'}".replace("in only", "only in")
+    return f"right to {_whole(left.min())} digits, loses the others {f'in {place}' if place else 'everywhere'}".replace(
+        "in only", "only in"
+    )
 
 
 def _small(evidence: Evidence) -> str:
@@ -56,7 +62,10 @@ def _small(evidence: Evidence) -> str:
             want, have = array(value), array(seen.got.get(name))
             if want is None or have is None or want.shape != have.shape:
                 return ""
-            worst, small = max(worst, float(np.abs(want - have).max(initial=0.0))), max(small, float(np.abs(want).max(initial=0.0)))
+            worst, small = (
+                max(worst, float(np.abs(want - have).max(initial=0.0))),
+                max(small, float(np.abs(want).max(initial=0.0))),
+            )
     if worst > 1e-5 * min(1.0, small) or small == 0:
         return ""
     place = where(evidence)
@@ -65,7 +74,10 @@ def _small(evidence: Evidence) -> str:
 
 def single(evidence: Evidence) -> str:
     """Whether all numbers of the answers are of single precision, though the right ones are not."""
-    have, want = (_numbers(seen.got for seen in evidence.failed), _numbers(seen.case.expected for seen in evidence.failed))
+    have, want = (
+        _numbers(seen.got for seen in evidence.failed),
+        _numbers(seen.case.expected for seen in evidence.failed),
+    )
     if have.size <= ENOUGH or want.size <= ENOUGH or not _is_single(have) or _is_single(want):
         return ""
     return "single precision: every number of the answers is one of 32 bits"
@@ -75,7 +87,7 @@ def _numbers(answers: Iterable[Answer]) -> Array:
     """All finite numbers that are not whole."""
     values = [array(value) for answer in answers for value in answer.values()]
     x = np.concatenate([v.ravel() for v in values if v is not None] or [np.zeros(0)])
-    return x[np.isfinite(x) & (x != np.round(x))]
+    return np.asarray(x[np.isfinite(x) & (x != np.round(x))])
 
 
 def _is_single(x: Array) -> bool:

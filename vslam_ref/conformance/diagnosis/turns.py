@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Answers turned back: a sign, a transpose, an order, a unit, a factor, signs of entries.
 
 Each is a repair: it turns a wrong answer into the right one, for every case of a function in the same way.
@@ -5,8 +6,10 @@ Each is a repair: it turns a wrong answer into the right one, for every case of 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +17,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess, array, spread
 from vslam_ref.conformance.vectors_format import Case
 
-TURNS: dict[str, Callable[[Array], Array]] = {
+TURNS: dict[str, Callable[[Array], Any]] = {
     "the sign is flipped": lambda x: -x,
     "the matrix is transposed, or column by column": lambda x: np.swapaxes(x, -1, -2),
     "it is the inverse": np.linalg.inv,
@@ -42,7 +45,9 @@ TURNS: dict[str, Callable[[Array], Array]] = {
     "it is one too small": lambda x: x + 1.0,
     "half a pixel is added": lambda x: x - 0.5,
     "half a pixel is missing": lambda x: x + 0.5,
-    "only whole turns differ: the angle is not wrapped into (-pi, pi]": lambda x: np.pi - (np.pi - x) % (2 * np.pi),
+    "only whole turns differ: the angle is not wrapped into (-pi, pi]": lambda x: (
+        np.pi - (np.pi - x) % (2 * np.pi)
+    ),
     "the last number is an angle that is not wrapped into (-pi, pi]": lambda x: _wrapped_last(x),
     "the third number is an angle that is not wrapped into (-pi, pi]": lambda x: _wrapped_third(x),
     "the long way round: the angle is beyond pi": lambda x: _short_way(x),
@@ -79,19 +84,23 @@ def _four(x: Array) -> Array:
     return x
 
 
+def _wrap(x: Any) -> Any:
+    return np.pi - (np.pi - x) % (2 * np.pi)
+
+
 def _wrapped_last(x: Array) -> Array:
     out = x.copy()
-    out[..., -1] = np.pi - (np.pi - out[..., -1]) % (2 * np.pi)
+    out[..., -1] = _wrap(out[..., -1])
     return out
 
 
 def _wrapped_third(x: Array) -> Array:
     out = x.copy()
-    out[2] = np.pi - (np.pi - out[2]) % (2 * np.pi)
+    out[2] = _wrap(out[2])
     return out
 
 
-def on_output(name: str, turn: Callable[[Array], Array]) -> Guess:
+def on_output(name: str, turn: Callable[[Array], Any]) -> Guess:
     """The repair that turns one output."""
 
     def repair(case: Case, got: Answer) -> Answer | None:
@@ -134,7 +143,7 @@ def both(evidence: Evidence, name: str, most: int = 12) -> list[tuple[Array, Arr
     return found
 
 
-def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[Array], Array]]]:
+def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[Array], Any]]]:
     """Repairs whose numbers are read off the failed cases."""
     ratios = np.array([np.vdot(w, h) / np.vdot(h, h) for w, h in pairs if np.vdot(h, h) > 0])
     if ratios.size and np.ptp(ratios) < 1e-6 * abs(ratios[0]):
@@ -157,10 +166,14 @@ def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[A
     if shape in ((2,), (3,), (4,)):
         for order in permutations(range(shape[0])):
             if list(order) != sorted(order):
-                yield f"the numbers are in another order: {_order(order)}", lambda x, o=order: x[list(o)]
+                yield f"the numbers are in another order: {_order(order)}", _ordered(order)
 
 
-FORWARD: dict[str, Callable[[Array], Array]] = {
+def _ordered(order: tuple[int, ...]) -> Callable[[Array], Any]:
+    return lambda x: x[list(order)]
+
+
+FORWARD: dict[str, Callable[[Array], Any]] = {
     "the square of the right value": lambda x: x * x,
     "the cube of the right value": lambda x: x**3,
     "the absolute value: its sign is lost": np.abs,
@@ -173,7 +186,7 @@ FORWARD: dict[str, Callable[[Array], Array]] = {
     "only the diagonal is right, the rest is zero": lambda x: x * np.eye(*x.shape[-2:]),
     "the upper triangle is left at zero": np.tril,
     "the lower triangle is left at zero": np.triu,
-    **{f"rounded to {k} decimals": (lambda x, k=k: np.round(x, k)) for k in range(2, 13)},
+    **{f"rounded to {k} decimals": functools.partial(np.round, decimals=k) for k in range(2, 13)},
 }
 """What is given in place of the right value, where it cannot be turned back."""
 
@@ -186,7 +199,7 @@ def forward(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
             yield head + sentence, _made(name, change)
 
 
-def _made(name: str, change: Callable[[Array], Array]) -> Guess:
+def _made(name: str, change: Callable[[Array], Any]) -> Guess:
     def formula(case: Case, got: Answer) -> Answer | None:
         x = array(case.expected.get(name))
         if x is None:
@@ -210,7 +223,12 @@ def scaled(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
         head = f"{name}: " if len(evidence.function.outputs) > 1 else ""
         pairs = both(evidence, name)
         ratios = np.array([np.vdot(w, h) / np.vdot(w, w) if np.vdot(w, w) > 0 else np.nan for w, h in pairs])
-        if len(pairs) != len(rows) or len(pairs) < 3 or not np.isfinite(ratios).all() or np.ptp(ratios) < 1e-9:
+        if (
+            len(pairs) != len(rows)
+            or len(pairs) < 3
+            or not np.isfinite(ratios).all()
+            or np.ptp(ratios) < 1e-9
+        ):
             continue
         for feature in rows[0]:
             values = np.array([row.get(feature, np.nan) for row in rows])

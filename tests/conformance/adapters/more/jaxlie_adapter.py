@@ -1,17 +1,15 @@
 """jaxlie in double precision under the vectors.
 
-    vslam-ref verify --module tests/conformance/adapters/more/jaxlie_adapter.py
+vslam-ref verify --module tests/conformance/adapters/more/jaxlie_adapter.py
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 import jax
 import jaxlie
-
+import numpy as np
 from positional import asked
 
 jax.config.update("jax_enable_x64", True)

@@ -1,6 +1,6 @@
 """Pinocchio under the vectors; its Jexp and Jlog are those of the right side, so they are asked at -xi.
 
-    vslam-ref verify --module tests/conformance/adapters/more/pinocchio_adapter.py
+vslam-ref verify --module tests/conformance/adapters/more/pinocchio_adapter.py
 """
 
 from __future__ import annotations
@@ -8,9 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
 import pinocchio as pin
-
 from positional import asked
 
 

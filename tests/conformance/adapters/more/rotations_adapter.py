@@ -7,12 +7,10 @@ Known: transforms3d, rowan, ahrs, pytransform3d.
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
-
-import os
-
 from positional import asked
 
 
@@ -84,7 +82,9 @@ def pytransform3d() -> dict[str, Any]:
         "se3.left_jacobian_inverse": lambda xi: t.left_jacobian_SE3_inv(xi[first])[np.ix_(first, first)],
         "se3.inverse": t.invert_transform,
         "se3.adjoint": lambda T: t.adjoint_from_transform(T)[np.ix_(first, first)],
-        "so3.random": lambda N: np.array([r.matrix_from_quaternion(r.random_quaternion(np.random.default_rng(k))) for k in range(int(N))]),
+        "so3.random": lambda N: np.array(
+            [r.matrix_from_quaternion(r.random_quaternion(np.random.default_rng(k))) for k in range(int(N))]
+        ),
     }
 
 

@@ -1,17 +1,14 @@
 """spatialmath-python under the vectors.
 
-    vslam-ref verify --module tests/conformance/adapters/more/spatialmath_adapter.py
+vslam-ref verify --module tests/conformance/adapters/more/spatialmath_adapter.py
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from spatialmath import base
-
 from positional import asked
+from spatialmath import base
 
 
 def se2_log(x: Any) -> Any:
