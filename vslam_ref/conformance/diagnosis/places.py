@@ -106,7 +106,8 @@ def entries(evidence: Evidence) -> str:
             said.append(f"{places(wrong)} of {name}{_how(evidence, name, wrong)}")
     if not said or (whole == len(names)):
         return ""
-    return f"only {' and '.join(said)} {'are' if len(said) > 1 else 'is'} wrong"
+    many = len(said) > 1 or said[0].startswith("entries")
+    return f"only {' and '.join(said)} {'are' if many else 'is'} wrong"
 
 
 def _masks(evidence: Evidence, name: str) -> tuple[Array, bool] | None:
