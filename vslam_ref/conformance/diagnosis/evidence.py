@@ -32,7 +32,7 @@ CASES_TRIED = 60
 """Cases of a function on which a guess is tested, failed ones and passed ones each."""
 
 
-class Judged(Protocol):
+class CaseOutcome(Protocol):
     """A case and what became of it, as the runner has it."""
 
     file: VectorFile
@@ -41,12 +41,12 @@ class Judged(Protocol):
     got: Any
     cause: str
 
-    def _replace(self, **changed: Any) -> Judged:
+    def _replace(self, **changed: Any) -> CaseOutcome:
         """A changed copy."""
         ...
 
 
-class Seen(NamedTuple):
+class AnsweredCase(NamedTuple):
     """A case with the program's answer."""
 
     case: Case
@@ -60,13 +60,13 @@ class Evidence(NamedTuple):
     ----------
     function : Function
     file : VectorFile
-    failed, passed : list of Seen
+    failed, passed : list of AnsweredCase
         Cases with an answer that can be compared.
     not_refused, refused : list of Case
         Cases without an answer: answered all the same, and refused.
-    errors : list of Judged
+    errors : list of CaseOutcome
         Without a usable reply.
-    random : list of Judged
+    random : list of CaseOutcome
         Statistical cases.
     ask : callable
         Asks the program once more: (function, inputs) -> outputs or None.
@@ -74,16 +74,16 @@ class Evidence(NamedTuple):
 
     function: Function
     file: VectorFile
-    failed: list[Seen]
-    passed: list[Seen]
+    failed: list[AnsweredCase]
+    passed: list[AnsweredCase]
     not_refused: list[Case]
     refused: list[Case]
-    errors: list[Judged]
-    random: list[Judged]
+    errors: list[CaseOutcome]
+    random: list[CaseOutcome]
     ask: Ask
 
     @property
-    def plain(self) -> list[Seen]:
+    def plain(self) -> list[AnsweredCase]:
         """Failed cases first."""
         return [*self.failed, *self.passed]
 
@@ -94,7 +94,7 @@ class Evidence(NamedTuple):
         return int(len(self.failed) + len(self.not_refused) + len(self.errors) + random)
 
 
-def gather(outcomes: Iterable[Judged], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
+def gather(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
     """Evidence about every function of which something went wrong."""
     those = defaultdict(list)
     for outcome in outcomes:
@@ -104,7 +104,7 @@ def gather(outcomes: Iterable[Judged], ask: Ask, profile: Profile = "float64") -
     return [evidence for evidence in found if evidence.wrong]
 
 
-def _in_profile(outcome: Judged, profile: Profile) -> Judged:
+def _in_profile(outcome: CaseOutcome, profile: Profile) -> CaseOutcome:
     """The outcome with the profile's tolerance in its case."""
     if profile == "float64":
         return outcome
@@ -113,15 +113,15 @@ def _in_profile(outcome: Judged, profile: Profile) -> Judged:
     return outcome._replace(case=case._replace(tolerance=tolerance))
 
 
-def _of(function: Function, group: list[Judged], ask: Ask) -> Evidence:
+def _of(function: Function, group: list[CaseOutcome], ask: Ask) -> Evidence:
     valid = [o for o in group if o.case.result == "valid" and o.case.statistic is None]
     invalid = [o for o in group if o.case.result == "invalid"]
     answered = [o for o in valid if isinstance(o.got, dict)]
     return Evidence(
         function,
         group[0].file,
-        [Seen(o.case, o.got) for o in answered if o.status == "failed"],
-        [Seen(o.case, o.got) for o in answered if o.status not in ("failed", "error")],
+        [AnsweredCase(o.case, o.got) for o in answered if o.status == "failed"],
+        [AnsweredCase(o.case, o.got) for o in answered if o.status not in ("failed", "error")],
         [o.case for o in invalid if o.status == "failed"],
         [o.case for o in invalid if o.status == "passed"],
         [o for o in group if o.status == "error"],
@@ -140,7 +140,7 @@ class Test(NamedTuple):
     """How many failures a guess explains, and the passed cases that speak against it."""
 
     explained: int
-    against: list[Seen]
+    against: list[AnsweredCase]
 
 
 NO = Test(0, [])
@@ -166,13 +166,13 @@ def predicts(evidence: Evidence, formula: Guess) -> Test:
     by an answer that is itself wrong, and far nearer to the program's than the right one is.
     """
 
-    def same(seen: Seen) -> bool | None:
+    def same(seen: AnsweredCase) -> bool | None:
         answer = formula(seen.case, seen.got)
         if not answer:
             return None
         return _right(like(seen.case, answer), seen.got)
 
-    def explained(seen: Seen) -> bool | None:
+    def explained(seen: AnsweredCase) -> bool | None:
         answer = formula(seen.case, seen.got)
         if not answer:
             return None
@@ -188,8 +188,8 @@ def predicts(evidence: Evidence, formula: Guess) -> Test:
 
 def _count(
     evidence: Evidence,
-    agrees: Callable[[Seen], bool | None],
-    stays: Callable[[Seen], bool | None] | None = None,
+    agrees: Callable[[AnsweredCase], bool | None],
+    stays: Callable[[AnsweredCase], bool | None] | None = None,
     share: float = 1.0,
 ) -> Test:
     """How many failures agree, if that is most of them and a share of those that say something."""
@@ -226,7 +226,7 @@ def distance(a: Answer, b: Answer) -> float:
     return worst
 
 
-def spread(seen: list[Seen], most: int) -> list[Seen]:
+def spread(seen: list[AnsweredCase], most: int) -> list[AnsweredCase]:
     """Some of a list, from all of it."""
     return seen[:: max(1, -(-len(seen) // most))]
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.changes import FAILURES
-from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess, Seen, array
+from vslam_ref.conformance.diagnosis.evidence import Answer, AnsweredCase, Evidence, Guess, array
 from vslam_ref.conformance.vectors_format import Case
 
 Spoil = Callable[[str, Array], Array]
@@ -159,7 +159,7 @@ def added_noise(evidence: Evidence) -> str:
     return f"a block is added to S beside H P H^T and cov_z, the same in all cases: [{rows}]: process noise as sensor noise"
 
 
-def _block(seen: Seen) -> Array | None:
+def _block(seen: AnsweredCase) -> Array | None:
     """What is in S beside H P H^T and cov_z, for one sighting."""
     given: dict[str, Any] = {name: array(value) for name, value in seen.case.inputs.items()}
     after: Any = array(seen.got.get("P"))

@@ -11,11 +11,11 @@ from vslam_ref.conformance.diagnosis import places, sizes
 from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
 from vslam_ref.conformance.diagnosis.declared import declared
 from vslam_ref.conformance.diagnosis.evidence import (
+    AnsweredCase,
     Ask,
+    CaseOutcome,
     Evidence,
     Guess,
-    Judged,
-    Seen,
     Test,
     gather,
     mostly,
@@ -57,7 +57,7 @@ FAMILIES = (
 """In this order; the first name that fits is taken."""
 
 
-def name_functions(outcomes: Iterable[Judged], ask: Ask, profile: Profile = "float64") -> dict[str, str]:
+def name_functions(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float64") -> dict[str, str]:
     """A sentence for every function of which something went wrong.
 
     Parameters
@@ -125,7 +125,7 @@ def _searched(evidence: Evidence) -> tuple[str, str]:
     return (f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""), partly
 
 
-def _part(evidence: Evidence, sentence: str, count: int, against: list[Seen]) -> str:
+def _part(evidence: Evidence, sentence: str, count: int, against: list[AnsweredCase]) -> str:
     """A guess that holds in the failed cases only: where that is, if there is a word for it."""
     if count < len(evidence.failed) or count < places.FEWEST:
         return ""
@@ -143,7 +143,7 @@ def _unasked(evidence: Evidence) -> Iterator[str]:
     if evidence.errors:
         first = evidence.errors[0].cause.partition("\n")[0][:100]
         lost_cases = evidence._replace(
-            failed=[Seen(o.case, {}) for o in evidence.errors], passed=evidence.plain
+            failed=[AnsweredCase(o.case, {}) for o in evidence.errors], passed=evidence.plain
         )
         place = places.where(lost_cases)
         yield f"no usable answer in {len(evidence.errors)} cases{f', {place}' if place else ''}: {first}"

@@ -49,7 +49,7 @@ CALLS = {
 LEFT_ALONE = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Compare, ast.Subscript)
 
 
-class Change(NamedTuple):
+class ChangedLine(NamedTuple):
     """One changed line: the function, its new code, and what is said of it."""
 
     target: Any
@@ -66,7 +66,7 @@ def one_change(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
         yield change.text, _changed(evidence, change)
 
 
-def _changed(evidence: Evidence, change: Change) -> Guess:
+def _changed(evidence: Evidence, change: ChangedLine) -> Guess:
     def guess(case: Case, got: Answer) -> Answer | None:
         with exchanged(change.target, change.code), use_backend("numpy"), bounded():
             return library(evidence, case.inputs)
@@ -176,12 +176,12 @@ def _function_of(code: CodeType) -> FunctionType | None:
     return next(owners, None)
 
 
-def changes(those: list[FunctionType]) -> list[Change]:
+def changes(those: list[FunctionType]) -> list[ChangedLine]:
     """All single changes of some functions."""
     return [change for function in those for change in _of(function)]
 
 
-def _of(function: FunctionType) -> list[Change]:
+def _of(function: FunctionType) -> list[ChangedLine]:
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     except (OSError, TypeError, SyntaxError):
@@ -197,7 +197,7 @@ def _of(function: FunctionType) -> list[Change]:
         act()
         code = _compiled(changed, function)
         if code is not None:
-            found.append(Change(function, code, f"as if in '{_cut(line)}' ({_name(function)}) {words}"))
+            found.append(ChangedLine(function, code, f"as if in '{_cut(line)}' ({_name(function)}) {words}"))
     return found
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.conformance.diagnosis.evidence import Evidence, Seen, array
+from vslam_ref.conformance.diagnosis.evidence import AnsweredCase, Evidence, array
 from vslam_ref.conformance.diagnosis.turns import both, numbers_of, places
 from vslam_ref.conformance.vectors_format import Case
 
@@ -22,7 +22,7 @@ FEWEST = 3
 """Cases that a range needs on either side."""
 
 
-def where(evidence: Evidence, passed_ones: list[Seen] | None = None) -> str:
+def where(evidence: Evidence, passed_ones: list[AnsweredCase] | None = None) -> str:
     """What the failed cases have, and no passed one (or none of some); empty where there is no such thing."""
     others = evidence.passed if passed_ones is None else passed_ones
     failed, passed = [s.case for s in evidence.failed], [s.case for s in others]

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Seen, array, distance
+from vslam_ref.conformance.diagnosis.evidence import Answer, AnsweredCase, Evidence, array, distance
 from vslam_ref.conformance.diagnosis.places import where
 
 ROUNDING = 1e-13
@@ -17,7 +17,7 @@ ENOUGH = 3.0
 """Digits from which an answer counts as right with digits lost."""
 
 
-def error(seen: Seen) -> float:
+def error(seen: AnsweredCase) -> float:
     """The largest error of all outputs, relative to the largest entry; infinity where nothing compares."""
     return distance(seen.case.expected, seen.got)
 
