@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,14 @@ from scipy.stats import chi2
 from wrong_programs import FIRST, SECOND, Fate, Wrong, judge, program, true_name, vectors
 
 from vslam_ref.conformance.adapters import itself
-from vslam_ref.conformance.adapters.table import plain
+from vslam_ref.conformance.adapters.table import answer_from, plain
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.diagnosis import NOTHING, diagnose
+from vslam_ref.conformance.diagnosis.evidence import Evidence, gather, mostly, repairs
 from vslam_ref.conformance.diagnosis.one_change import exchanged
 from vslam_ref.conformance.program import InProcess
 from vslam_ref.conformance.runner import ask as ask_case
+from vslam_ref.conformance.runner import run
 
 QUICK = [FIRST[k] for k in (0, 1, 2, 3, 4, 10, 12, 15, 19, 24, 27, 29, 35, 39, 42, 44, 50, 53, 56)]
 
@@ -218,3 +221,42 @@ def test_fates_say_what_happened() -> None:
     assert Fate(0, 5, "").slips
     assert not Fate(3, 5, f"{NOTHING}; wrong: somewhere").named
     assert Fate(3, 5, "the sign is flipped").named
+
+
+def evidence_of(function: str, answering: Any) -> Evidence:
+    """What is known of a function after a run."""
+    module = ModuleType("mine")
+    module.answer = lambda name, inputs: answer_from({function: answering}, name, inputs)  # type: ignore[attr-defined]
+    outcomes = run(InProcess(module), [vectors(function)]).outcomes
+    (found,) = gather(outcomes, lambda name, inputs: None)
+    return found
+
+
+def back(case: Any, got: Any) -> Any:
+    """The repair of a transposed matrix."""
+    return {"R": np.transpose(got["R"]).tolist()}
+
+
+def test_a_guess_must_explain_most_failures_and_no_passed_case_may_speak_against_it() -> None:
+    def mixed(share: float) -> Any:
+        limit = np.quantile([np.linalg.norm(c.inputs["phi"]) for c in vectors("so3.exp").cases], share)
+
+        def answer(phi: Any) -> Any:
+            R = plain_motions.so3_exp(phi)
+            return R.T if np.linalg.norm(phi) >= limit else R + 0.1
+
+        return answer
+
+    few, many = evidence_of("so3.exp", mixed(0.8)), evidence_of("so3.exp", mixed(0.2))
+    assert mostly(few, back).explained == 0
+    assert mostly(many, back).explained > 0.7 * len(many.failed)
+    assert repairs(many, back).explained == 0  # one case that speaks against it is enough
+
+    def above(phi: Any) -> Any:
+        R = plain_motions.so3_exp(phi)
+        return R.T if np.linalg.norm(phi) > 3.0 else R
+
+    partly = repairs(evidence_of("so3.exp", above), back)
+    assert partly.explained > 0
+    assert partly.against
+    assert named("so3.exp", above).endswith("near_pi: the matrix is transposed, or column by column")
