@@ -10,7 +10,7 @@ module                holds
 ``conventions``       a program's own conventions, and the way there and back
 ``compare``           right or wrong, within a tolerance
 ``statistics``        random answers
-``diagnose``          what is probably wrong
+``diagnosis/``        what is probably wrong
 ``runner``            all of it, case by case
 ``report``            the result as a page
 ``adapters/``         what makes other libraries, and this one, answer

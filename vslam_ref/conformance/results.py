@@ -56,6 +56,11 @@ class Outcome(NamedTuple):
         return self.status in ("failed", "error")
 
 
+def is_name(text: str) -> bool:
+    """Whether a sentence names a mistake; that nothing fits, and where it is wrong, is no name."""
+    return bool(text) and not text.startswith(NOTHING)
+
+
 class Report(NamedTuple):
     """All outcomes of one program.
 
@@ -96,9 +101,9 @@ class Report(NamedTuple):
     @property
     def diagnoses(self) -> list[dict[str, Any]]:
         """Causes of failures, the commonest first, each with how often and where first."""
-        bad = [o for o in self.outcomes if o.status == "failed" and o.cause]
-        first = {(o.case.function, o.cause): o.case.id for o in reversed(bad)}
-        often = Counter((o.case.function, o.cause) for o in bad)
+        bad = [(o, self.name(o)) for o in self.outcomes if o.status == "failed" and is_name(self.name(o))]
+        first = {(o.case.function, name): o.case.id for o, name in reversed(bad)}
+        often = Counter((o.case.function, name) for o, name in bad)
         return [
             {"function": function, "cause": cause, "cases": count, "first": first[function, cause]}
             for (function, cause), count in often.most_common()
@@ -107,15 +112,17 @@ class Report(NamedTuple):
     @property
     def unexplained(self) -> dict[str, int]:
         """Failures without a name, by function."""
-        those = [o for o in self.outcomes if o.status == "failed" and self.name(o) in ("", NOTHING)]
+        those = [o for o in self.outcomes if o.status == "failed" and not is_name(self.name(o))]
         return dict(Counter(o.case.function for o in those).most_common())
 
     def name(self, outcome: Outcome) -> str:
-        """What is wrong in a failed case: the name of its function's mistake, or the case's own cause."""
+        """What is wrong in a failed case: what all cases of its function bear out, if they were looked at.
+
+        What one case alone suggests may be chance; it stands where nobody looked at all of them.
+        """
         if outcome.status not in ("failed", "lost digits"):
             return ""
-        whole = self.functions_named.get(outcome.case.function, "")
-        return whole if whole not in ("", NOTHING) else outcome.cause or whole
+        return self.functions_named.get(outcome.case.function, "") or outcome.cause
 
     def numbers(self) -> dict[str, Any]:
         """The content of ``--json``."""

@@ -73,7 +73,11 @@ def diagnose(file: VectorFile, case: Case, got: Any, profile: Profile = "float64
     if case.statistic is not None or len(function.outputs) > 2:
         return ""
     for sentence, (kinds, turn) in TURNS.items():
+        if case.result == "convention" and not kinds:
+            continue  # a sign, a unit, a factor is no convention that a program may have
         for name, kind in function.outputs.items():
+            if "factor" in sentence and not _telling(got.get(name)):
+                continue
             turned = _turned(got, name, kind, kinds, turn)
             if turned is not None and compare(case, turned, profile).right:
                 return f"{name}: {sentence}"
@@ -86,6 +90,14 @@ def known_mistake(file: VectorFile, case: Case, got: dict[str, Any], profile: Pr
     for note, answer in case.mistakes.items():
         found = found or (note if matches(answer, got, case, profile) else "")
     return f"{found}: {file.notes[found]['meaning']}" if found else ""
+
+
+def _telling(value: Any) -> bool:
+    """Whether a factor can be told from a power: more than one number."""
+    try:
+        return numbers(value).size > 1
+    except ValueError:
+        return False
 
 
 def _turned(

@@ -1,0 +1,148 @@
+# ruff: noqa: E501
+"""One name for each function that fails: the most particular guess that all its cases bear out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+from vslam_ref.conformance.compare import Profile
+from vslam_ref.conformance.diagnosis import places, sizes
+from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
+from vslam_ref.conformance.diagnosis.declared import declared
+from vslam_ref.conformance.diagnosis.evidence import (
+    AnsweredCase,
+    Ask,
+    CaseOutcome,
+    Evidence,
+    Guess,
+    Test,
+    gather,
+    mostly,
+    predicts,
+    repairs,
+)
+from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
+from vslam_ref.conformance.diagnosis.formulas import formulas
+from vslam_ref.conformance.diagnosis.notes import noted, random_note
+from vslam_ref.conformance.diagnosis.one_change import one_change
+from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
+from vslam_ref.conformance.results import NOTHING
+
+FEW_PASS = 0.25
+"""Where fewer pass, for each that fails, the place of the failures says little: what passes is trivial."""
+
+
+class Family(NamedTuple):
+    """Guesses of one kind, and how they are tested."""
+
+    guesses: Callable[[Evidence], Iterator[tuple[str, Guess]]]
+    test: Callable[[Evidence, Guess], Test]
+
+
+FAMILIES = (
+    Family(noted, predicts),
+    Family(declared, mostly),
+    Family(formulas, predicts),
+    Family(spoiled, predicts),
+    Family(echoes, predicts),
+    Family(turns, repairs),
+    Family(forward, predicts),
+    Family(scaled, repairs),
+    Family(undone, repairs),
+    Family(lost, predicts),
+    Family(one_change, predicts),
+)
+"""In this order; the first name that fits is taken."""
+
+
+def name_functions(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float64") -> dict[str, str]:
+    """A sentence for every function of which something went wrong.
+
+    Parameters
+    ----------
+    outcomes : iterable of Outcome
+        All of a run.
+    ask : callable
+        Asks the program again: (function, inputs in the house's convention) -> outputs, or None.
+    profile : {"float64", "float32"}
+
+    Returns
+    -------
+    dict of str to str
+        Function -> its name, or :data:`NOTHING`.
+    """
+    return {evidence.function.name: name(evidence) for evidence in gather(outcomes, ask, profile)}
+
+
+def name(evidence: Evidence) -> str:
+    """The name of one function's failures."""
+    others = [*random_note(evidence), *_unasked(evidence)]
+    main = _main(evidence) if evidence.failed else ""
+    said = [sentence for sentence in (main, *others) if sentence]
+    return "; ".join(said) or NOTHING
+
+
+def _main(evidence: Evidence) -> str:
+    """What explains the answers that can be compared."""
+    if last := sizes.rounding(evidence):
+        return last
+    whole, part = _searched(evidence)
+    if whole:
+        return whole
+    if (
+        odd := added_noise(evidence)
+        or places.shape(evidence)
+        or sizes.odd(evidence)
+        or sizes.single(evidence)
+    ):
+        return odd
+    if part:
+        return part
+    if found := sizes.digits(evidence):
+        return found
+    place, entry = places.where(evidence), places.entries(evidence)
+    if place and len(evidence.passed) < FEW_PASS * len(evidence.failed) and not entry:
+        return f"{NOTHING}; wrong: {place}"
+    return ": ".join(part for part in (place, entry) if part)
+
+
+def _searched(evidence: Evidence) -> tuple[str, str]:
+    """The guess that explains all failures, or else most; and one that explains all, though some cases escape it."""
+    best, most, partly = "", 0, ""
+    for family in FAMILIES:
+        for sentence, guess in family.guesses(evidence):
+            count, against = family.test(evidence, guess)
+            if against:
+                partly = partly or _part(evidence, sentence, count, against)
+                continue
+            if count > most:
+                best, most = sentence, count
+            if count and count >= len(evidence.failed):
+                return sentence, ""
+    left = len(evidence.failed) - most
+    return (f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""), partly
+
+
+def _part(evidence: Evidence, sentence: str, count: int, against: list[AnsweredCase]) -> str:
+    """A guess that holds in the failed cases only: where that is, if there is a word for it."""
+    if count < len(evidence.failed) or count < places.FEWEST:
+        return ""
+    place = places.where(evidence, against)
+    return (
+        f"{place}: {sentence}" if place else f"in {count} of {count + len(evidence.passed)} cases {sentence}"
+    )
+
+
+def _unasked(evidence: Evidence) -> Iterator[str]:
+    """What is said of questions without an answer, and of answers that did not come."""
+    if evidence.not_refused:
+        some = f"{len(evidence.not_refused)} of {len(evidence.not_refused) + len(evidence.refused)}"
+        yield f"answers what must be refused ({some} such cases)"
+    if evidence.errors:
+        first = evidence.errors[0].cause.partition("\n")[0][:100]
+        lost_cases = evidence._replace(
+            failed=[AnsweredCase(o.case, {}) for o in evidence.errors], passed=evidence.plain
+        )
+        place = places.where(lost_cases)
+        yield f"no usable answer in {len(evidence.errors)} cases{f', {place}' if place else ''}: {first}"
