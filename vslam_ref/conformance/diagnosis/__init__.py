@@ -16,7 +16,8 @@
 A name of a function is only given where no case speaks against it and most failures are explained.
 """
 
-from vslam_ref.conformance.diagnosis.names import NOTHING, name_functions
+from vslam_ref.conformance.diagnosis.names import name_functions
 from vslam_ref.conformance.diagnosis.single import diagnose, known_mistake
+from vslam_ref.conformance.results import NOTHING
 
 __all__ = ["NOTHING", "diagnose", "known_mistake", "name_functions"]

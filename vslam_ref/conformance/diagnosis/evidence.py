@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.catalogue import Function, functions
 from vslam_ref.conformance.compare import Profile, compare, numbers
+from vslam_ref.conformance.results import Outcome
 from vslam_ref.conformance.vectors_format import Case, VectorFile
 
 Answer = dict[str, Any]
@@ -30,20 +31,6 @@ SCREENED = 3
 """Failed cases that are looked at first."""
 CASES_TRIED = 60
 """Cases of a function on which a guess is tested, failed ones and passed ones each."""
-
-
-class CaseOutcome(Protocol):
-    """A case and what became of it, as the runner has it."""
-
-    file: VectorFile
-    case: Case
-    status: Any
-    got: Any
-    cause: str
-
-    def _replace(self, **changed: Any) -> CaseOutcome:
-        """A changed copy."""
-        ...
 
 
 class AnsweredCase(NamedTuple):
@@ -64,9 +51,9 @@ class Evidence(NamedTuple):
         Cases with an answer that can be compared.
     not_refused, refused : list of Case
         Cases without an answer: answered all the same, and refused.
-    errors : list of CaseOutcome
+    errors : list of Outcome
         Without a usable reply.
-    random : list of CaseOutcome
+    random : list of Outcome
         Statistical cases.
     ask : callable
         Asks the program once more: (function, inputs) -> outputs or None.
@@ -78,8 +65,8 @@ class Evidence(NamedTuple):
     passed: list[AnsweredCase]
     not_refused: list[Case]
     refused: list[Case]
-    errors: list[CaseOutcome]
-    random: list[CaseOutcome]
+    errors: list[Outcome]
+    random: list[Outcome]
     ask: Ask
 
     @property
@@ -94,7 +81,7 @@ class Evidence(NamedTuple):
         return int(len(self.failed) + len(self.not_refused) + len(self.errors) + random)
 
 
-def gather(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
+def gather(outcomes: Iterable[Outcome], ask: Ask, profile: Profile = "float64") -> list[Evidence]:
     """Evidence about every function of which something went wrong."""
     those = defaultdict(list)
     for outcome in outcomes:
@@ -104,7 +91,7 @@ def gather(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float6
     return [evidence for evidence in found if evidence.wrong]
 
 
-def _in_profile(outcome: CaseOutcome, profile: Profile) -> CaseOutcome:
+def _in_profile(outcome: Outcome, profile: Profile) -> Outcome:
     """The outcome with the profile's tolerance in its case."""
     if profile == "float64":
         return outcome
@@ -113,15 +100,19 @@ def _in_profile(outcome: CaseOutcome, profile: Profile) -> CaseOutcome:
     return outcome._replace(case=case._replace(tolerance=tolerance))
 
 
-def _of(function: Function, group: list[CaseOutcome], ask: Ask) -> Evidence:
+def _answered(outcomes: list[Outcome]) -> list[AnsweredCase]:
+    return [AnsweredCase(o.case, o.got) for o in outcomes if isinstance(o.got, dict)]
+
+
+def _of(function: Function, group: list[Outcome], ask: Ask) -> Evidence:
     valid = [o for o in group if o.case.result == "valid" and o.case.statistic is None]
     invalid = [o for o in group if o.case.result == "invalid"]
-    answered = [o for o in valid if isinstance(o.got, dict)]
+    wrong = [o for o in valid if o.status == "failed"] or [o for o in valid if o.status == "lost digits"]
     return Evidence(
         function,
         group[0].file,
-        [AnsweredCase(o.case, o.got) for o in answered if o.status == "failed"],
-        [AnsweredCase(o.case, o.got) for o in answered if o.status not in ("failed", "error")],
+        _answered(wrong),
+        _answered([o for o in valid if o.status == "passed"]),
         [o.case for o in invalid if o.status == "failed"],
         [o.case for o in invalid if o.status == "passed"],
         [o for o in group if o.status == "error"],

@@ -13,7 +13,6 @@ from vslam_ref.conformance.diagnosis.declared import declared
 from vslam_ref.conformance.diagnosis.evidence import (
     AnsweredCase,
     Ask,
-    CaseOutcome,
     Evidence,
     Guess,
     Test,
@@ -27,7 +26,7 @@ from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
 from vslam_ref.conformance.diagnosis.one_change import one_change
 from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
-from vslam_ref.conformance.results import NOTHING
+from vslam_ref.conformance.results import NOTHING, Outcome
 
 FEW_PASS = 0.25
 """Where fewer pass, for each that fails, the place of the failures says little: what passes is trivial."""
@@ -56,7 +55,7 @@ FAMILIES = (
 """In this order; the first name that fits is taken."""
 
 
-def name_functions(outcomes: Iterable[CaseOutcome], ask: Ask, profile: Profile = "float64") -> dict[str, str]:
+def name_functions(outcomes: Iterable[Outcome], ask: Ask, profile: Profile = "float64") -> dict[str, str]:
     """A sentence for every function of which something went wrong.
 
     Parameters

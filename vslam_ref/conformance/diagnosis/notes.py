@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vslam_ref.conformance.diagnosis.evidence import Answer, CaseOutcome, Evidence, Guess
+from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess
+from vslam_ref.conformance.results import Outcome
 from vslam_ref.conformance.statistics import mistaken
 from vslam_ref.conformance.vectors_format import Case
 
@@ -42,7 +43,7 @@ def random_note(evidence: Evidence) -> Iterator[str]:
     yield f"the distribution is off in {' and '.join(measures)}"
 
 
-def _agreed(random: list[CaseOutcome], note: str) -> bool:
+def _agreed(random: list[Outcome], note: str) -> bool:
     """Whether every case that carries a note has it, and one of them at least."""
     carry = [o for o in random if note in (o.case.statistic or {}).get("mistakes", {})]
     single = [o._replace(case=_only(o.case, note)) for o in carry]
