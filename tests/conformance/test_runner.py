@@ -396,7 +396,7 @@ def test_names_of_functions_are_asked_for_and_told(monkeypatch: pytest.MonkeyPat
         assert outcomes[0].got == {"R": (R + 1.0).tolist()}
         return {"so3.exp": "one is added"}
 
-    monkeypatch.setattr(runner, "_namer", lambda: namer)
+    monkeypatch.setattr(runner, "name_functions", namer)
     report = one((R + 1.0).tolist())
     assert again == [{"R": (R + 1.0).tolist()}]
     told = report.numbers()
@@ -409,11 +409,11 @@ def test_names_that_fail_or_do_not_fit_lose_nothing(monkeypatch: pytest.MonkeyPa
     def fails(*_: Any) -> dict[str, str]:
         raise ZeroDivisionError("no name")
 
-    monkeypatch.setattr(runner, "_namer", lambda: fails)
+    monkeypatch.setattr(runner, "name_functions", fails)
     report = one((R + 1.0).tolist())
     assert report.count("failed") == 1
     assert any("ZeroDivisionError" in note for note in report.notes)
-    monkeypatch.setattr(runner, "_namer", lambda: lambda *_: {"so3.exp": NOTHING})
+    monkeypatch.setattr(runner, "name_functions", lambda *_: {"so3.exp": NOTHING})
     report = one((R + 1.0).tolist())
     assert report.unexplained == {"so3.exp": 1}
     assert report.numbers()["failures"][0]["name"] == NOTHING
@@ -426,6 +426,6 @@ def test_a_program_that_gives_no_reply_is_not_asked_again_for_names(monkeypatch:
         return {str(k): str(ask("so3.exp", {"phi": [0.0, 0.0, 0.0]})) for k in range(10)}
 
     program.script = "V" + 50 * "T"
-    monkeypatch.setattr(runner, "_namer", lambda: namer)
+    monkeypatch.setattr(runner, "name_functions", namer)
     run(program, [many("so3.exp", cases=1)])
     assert program.asked == 3

@@ -11,6 +11,7 @@ from mpmath import mpf
 from generator.angles import BEYOND, GRID, MANY_TURNS, angle_grid
 from generator.building import Topic, lost_digits, not_in_single, tolerance
 from generator.draws import log_uniform
+from generator.exact import DIGITS
 
 TOPIC, CHAPTER = "so2", 2
 
@@ -46,6 +47,11 @@ RANGES = {
 
 def build(rng: np.random.Generator) -> Topic:
     """Exponential and home interval."""
+    with mpmath.workdps(DIGITS):
+        return _built(rng)
+
+
+def _built(rng: np.random.Generator) -> Topic:
     topic = Topic(CHAPTER, TOPIC, NOTES)
     fine = tolerance(1e-15, "sine and cosine within an ulp, or by the half angle", float32=5e-7)
     for flag, (low, high) in RANGES.items():

@@ -113,7 +113,8 @@ def _searched(evidence: Evidence) -> tuple[str, str]:
         for sentence, guess in family.guesses(evidence):
             count, against = family.test(evidence, guess)
             if against:
-                partly = partly or _part(evidence, sentence, count, against)
+                if family.guesses is not declared:  # a convention holds in all cases, or it is none
+                    partly = partly or _part(evidence, sentence, count, against)
                 continue
             if count > most:
                 best, most = sentence, count
