@@ -54,7 +54,7 @@ class Options:
     cost: float = 1e-10
     gradient: float = 1e-10
     max_iterations: int = 200
-    damping: float = 1e-4
+    damping: float = 1e-8
     negligible: float = NEGLIGIBLE
     constant: float = 0.0
 
