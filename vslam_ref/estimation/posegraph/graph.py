@@ -10,7 +10,7 @@ r"""A pose graph as arrays: poses, and the edges between them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -159,7 +159,7 @@ def positive_definite(matrices: Array) -> BoolArray:
     return good
 
 
-def _require(good: BoolArray, name: str, what: str) -> None:
+def _require(good: Any, name: str, what: str) -> None:
     bad = np.flatnonzero(~good)
     if len(bad):
         raise ValueError(f"{name}[{bad[0]}] {what}")

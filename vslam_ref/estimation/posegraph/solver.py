@@ -22,11 +22,14 @@ from vslam_ref.estimation.least_squares import Descent, Iteration, descend
 from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.estimation.posegraph.errors import Convention
 from vslam_ref.estimation.posegraph.graph import PoseGraph, parts
-from vslam_ref.estimation.posegraph.switching import EdgeLoss, edge_loss
+from vslam_ref.estimation.posegraph.switching import LIKELY, EdgeLoss, edge_loss
 from vslam_ref.estimation.posegraph.system import NEGLIGIBLE, GraphModel, GraphProblem
 
 ROUNDING = 1e-13
 """A promise below this share of the cost cannot be seen in it."""
+
+SECOND_LOOKS = 10
+"""How often rejected edges are judged again, at most."""
 
 Progress = Callable[[Iteration], None]
 
@@ -162,7 +165,8 @@ def solve_graph(
     -------
     GraphSolution
         Never with a NaN in it.  With a loss that tells false edges, these are taken out in the end and the
-        others solved by least squares once more: a loss bends the minimum, if only a little.
+        others solved by least squares once more: a loss bends the minimum, if only a little.  Rejected edges
+        that are honest then (:func:`honest_limit`) are taken back.
 
     Notes
     -----
@@ -214,8 +218,36 @@ def _descended(
 def _refitted(
     robust: GraphSolution, convention: Convention, options: Options, progress: Progress | None
 ) -> GraphSolution:
-    """Solve the edges that were kept once more, by least squares."""
-    kept, graph = ~robust.rejected, robust.graph
+    """Solve the edges that were kept once more, by least squares, and take back what is honest then."""
+    found = robust
+    for _ in range(SECOND_LOOKS):
+        found = _least_squares(found, convention, options, progress)
+        honest = found.rejected & (found.squares <= honest_limit(found))
+        if not honest.any():
+            break
+        found = replace(found, rejected=found.rejected & ~honest)
+    return found
+
+
+def honest_limit(found: GraphSolution) -> float:
+    """Return the chi² that one honest edge in 1000 exceeds, by what the kept edges show.
+
+    A switch gives up an edge at c = 4, which one honest edge of four exceeds in the plane if its covariance
+    is right, and hardly any if it is pessimistic, as most are.  Which of both the kept edges tell: chi² per
+    degree of freedom, at most 1, scales the limit.
+    """
+    graph, kept = found.graph, ~found.rejected
+    free = int((~graph.fixed).sum())
+    freedom = graph.information.shape[-1] * (int(kept.sum()) - free)
+    share = float(found.squares[kept].sum()) / freedom if freedom > 0 else 0.0
+    return LIKELY[graph.space] * min(share, 1.0)
+
+
+def _least_squares(
+    before: GraphSolution, convention: Convention, options: Options, progress: Progress | None
+) -> GraphSolution:
+    """Solve the edges that are not rejected; a part that nothing holds any more stays where it is."""
+    kept, graph = ~before.rejected, before.graph
     n, _ = graph.sizes
     part = parts(n, graph.tail[kept], graph.head[kept])
     loose = ~np.isin(part, part[graph.fixed])
@@ -225,17 +257,16 @@ def _refitted(
     problem = GraphProblem(reduced, convention)
     begin = problem.linearise(problem.at(graph.T_world))
     if begin is None or reduced.fixed.all():
-        return robust
+        return before
     end = _descended(problem, begin, options, progress)
     T_world = end.here.place.T_world
-    squares = GraphProblem(graph, convention).at(T_world).squares
     return replace(
-        robust,
+        before,
         graph=graph.at(T_world),
-        squares=squares,
+        squares=GraphProblem(graph, convention).at(T_world).squares,
         reason=end.reason,
         message=end.message,
-        history=robust.history + end.history,
+        history=before.history + end.history,
         loosened=int(hold.sum()),
     )
 
