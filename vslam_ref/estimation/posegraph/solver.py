@@ -28,8 +28,10 @@ from vslam_ref.estimation.posegraph.system import NEGLIGIBLE, GraphModel, GraphP
 ROUNDING = 1e-13
 """A promise below this share of the cost cannot be seen in it."""
 
-SECOND_LOOKS = 10
-"""How often rejected edges are judged again, at most."""
+ROUGH = 1e-8
+"""Where a loss only has to tell which edges are false, a descent may end at this change of the cost."""
+WIDER = 4
+"""How often a loss is made wider, at most."""
 
 Progress = Callable[[Iteration], None]
 
@@ -165,8 +167,9 @@ def solve_graph(
     -------
     GraphSolution
         Never with a NaN in it.  With a loss that tells false edges, these are taken out in the end and the
-        others solved by least squares once more: a loss bends the minimum, if only a little.  Rejected edges
-        that are honest then (:func:`honest_limit`) are taken back.
+        others solved by least squares once more: a loss bends the minimum, if only a little.  Where the kept
+        edges show that the covariances are right (:func:`honest_limit`), a loss with its usual constant is
+        widened, and all edges are judged again.
 
     Notes
     -----
@@ -192,20 +195,45 @@ def solve_graph(
         return _unsolved(graph, first.squares, "not_finite", "the cost is not finite at the start")
     if graph.fixed.all():
         return _unsolved(graph, first.squares, "nothing_free", "no node may move")
-    end = _descended(problem, begin, options, progress)
-    weights = end.here.weights
-    false = judged & (weights < rule.false_below)
-    last = GraphSolution(
-        graph.at(end.here.place.T_world),
-        first.squares,
-        end.here.place.squares,
-        weights,
-        false,
-        end.reason,
-        end.message,
-        end.history,
+    found = _judged(_unsolved(graph, first.squares, "", ""), problem, rule, options, progress)
+    if not rule.limit:
+        return found
+    found = _least_squares(found, convention, options, progress)
+    for _ in range(WIDER if rule.usual else 0):
+        limit = honest_limit(found)
+        if limit <= 1.1 * rule.limit:
+            break
+        rule = rule.widened(limit)
+        problem = GraphProblem(graph, convention, rule.loss, judged, options.negligible)
+        found = _judged(found, problem, rule, options, progress)
+        found = _least_squares(found, convention, options, progress)
+    return found
+
+
+def _judged(
+    before: GraphSolution,
+    problem: GraphProblem,
+    rule: EdgeLoss,
+    options: Options,
+    progress: Progress | None,
+) -> GraphSolution:
+    """Descend from where it stands, and tell which edges are false."""
+    begin = problem.linearise(problem.at(before.graph.T_world))
+    if begin is None:
+        return before
+    rough = replace(options, cost=max(options.cost, ROUGH)) if rule.limit else options
+    end = _descended(problem, begin, rough, progress)
+    place, weights = end.here.place, end.here.weights
+    return replace(
+        before,
+        graph=before.graph.at(place.T_world),
+        squares=place.squares,
+        weights=weights,
+        rejected=problem.judged & (place.squares > rule.limit) if rule.limit else before.rejected,
+        reason=end.reason,
+        message=end.message,
+        history=before.history + end.history,
     )
-    return _refitted(last, convention, options, progress) if rule.false_below else last
 
 
 def _descended(
@@ -213,20 +241,6 @@ def _descended(
 ) -> Descent[GraphModel]:
     told: Progress = (lambda row: None) if progress is None else progress
     return descend(problem, begin, options.descent(), floor=problem.floor, progress=told)
-
-
-def _refitted(
-    robust: GraphSolution, convention: Convention, options: Options, progress: Progress | None
-) -> GraphSolution:
-    """Solve the edges that were kept once more, by least squares, and take back what is honest then."""
-    found = robust
-    for _ in range(SECOND_LOOKS):
-        found = _least_squares(found, convention, options, progress)
-        honest = found.rejected & (found.squares <= honest_limit(found))
-        if not honest.any():
-            break
-        found = replace(found, rejected=found.rejected & ~honest)
-    return found
 
 
 def honest_limit(found: GraphSolution) -> float:

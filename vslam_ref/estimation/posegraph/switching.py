@@ -3,14 +3,14 @@ r"""Losses that tell false loops from true ones: switches, dynamic covariance sc
 With :math:`c = e^\top\Omega e`, the square of an edge's error x in standard deviations, and half a square as
 the house's cost of a small error:
 
-==================  ============================================  ============================  ============
-loss                cost times 2                                  weight                        rejected if
-==================  ============================================  ============================  ============
-switchable          least of s² c + Xi (1 - s)² over s            s², s = Xi / (Xi + c)         weight < 1/4
-Geman-McClure       Xi c / (Xi + c)                               (Xi / (Xi + c))²              weight < 1/4
-DCS                 c, beyond Phi: Phi (3c - Phi) / (c + Phi)     s², s = min(1, 2 Phi/(Phi+c)) weight < 1/4
-max-mixture         the lesser of c and k + nu c                  1 or nu                       weight < 1/2
-==================  ============================================  ============================  ============
+==================  ============================================  ==============================  ===========
+loss                cost times 2                                  weight                          false above
+==================  ============================================  ==============================  ===========
+switchable          least of s² c + Xi (1 - s)² over s            s², s = Xi / (Xi + c)           c = Xi
+Geman-McClure       Xi c / (Xi + c)                               (Xi / (Xi + c))²                c = Xi
+DCS                 c, beyond Phi: Phi (3c - Phi) / (c + Phi)     s², s = min(1, 2 Phi/(Phi + c)) c = 3 Phi
+max-mixture         the lesser of c and k + nu c                  1 or nu                         c = k
+==================  ============================================  ==============================  ===========
 
 The first two are one loss: the switch s of an edge meets nothing but its own error, so its best value can be
 written down, and what is left is Geman-McClure with Xi = (constant of the loss)².  DCS takes twice that
@@ -132,10 +132,30 @@ class MaxMixture(Loss):
 
 
 class EdgeLoss(NamedTuple):
-    """A loss of edges: ``loss``, and the weight below which it calls an edge ``false_below`` (0: never)."""
+    """A loss of edges, and what it calls false.
+
+    Attributes
+    ----------
+    loss : Loss
+    limit : float
+        chi² above which an edge is false; 0: none is.
+    usual : bool
+        Whether the constant is the usual one, which the solver may widen.
+    """
 
     loss: Loss
-    false_below: float
+    limit: float = 0.0
+    usual: bool = False
+
+    def widened(self, limit: float) -> EdgeLoss:
+        """Return the same loss with another limit.
+
+        Examples
+        --------
+        >>> edge_loss("switchable", "se2").widened(16.0).loss
+        Switchable(c=4.0)
+        """
+        return self._replace(loss=self.loss.scaled((limit / self.limit) ** 0.5), limit=limit)
 
 
 NAMES = ("l2", "huber", "cauchy", "geman-mcclure", "switchable", "dcs", "max-mixture")
@@ -161,20 +181,21 @@ def edge_loss(name: str, space: Space, constant: float | None = None) -> EdgeLos
     Examples
     --------
     >>> edge_loss("dcs", "se2")
-    EdgeLoss(loss=DynamicCovariance(c=2.0), false_below=0.25)
+    EdgeLoss(loss=DynamicCovariance(c=2.0), limit=12.0, usual=True)
     """
     kinds: dict[str, tuple[type[Loss], float]] = {
         "l2": (L2, 0.0),
         "huber": (Huber, 0.0),
         "cauchy": (Cauchy, 0.0),
-        "geman-mcclure": (GemanMcClure, 0.25),
-        "switchable": (Switchable, 0.25),
-        "dcs": (DynamicCovariance, 0.25),
-        "max-mixture": (MaxMixture, 0.5),
+        "geman-mcclure": (GemanMcClure, 1.0),  # a weight of 1/4
+        "switchable": (Switchable, 1.0),
+        "dcs": (DynamicCovariance, 3.0),
+        "max-mixture": (MaxMixture, 1.0 / (1.0 - NULL)),
     }
     if name not in kinds:
         raise ValueError(f"unknown loss {name!r}; known: {', '.join(NAMES)}")
     usual = {"geman-mcclure": SWITCH**0.5, "max-mixture": LIKELY[space] ** 0.5}
-    kind, false_below = kinds[name]
+    kind, times = kinds[name]
     c = usual.get(name) if constant is None else constant
-    return EdgeLoss(kind() if c is None or name == "l2" else kind(c), false_below)
+    loss = kind() if c is None or name == "l2" else kind(c)
+    return EdgeLoss(loss, times * loss.c**2 if times else 0.0, constant is None)
