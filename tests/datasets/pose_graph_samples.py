@@ -65,7 +65,13 @@ def pose_graph_wrong(file: PoseGraphFile) -> str:
             return "a rotation is none"
     if not (np.diff(file.ids) > 0).all():
         return "ids do not go up"
-    for start in (odometry_start(graph), chordal_start(graph)):
+    starts = [odometry_start(graph)]
+    try:
+        starts.append(chordal_start(graph))
+    except ValueError as error:  # information of one edge 1e30 times that of another
+        if "its system is singular" not in str(error):
+            raise
+    for start in starts:
         if not np.isfinite(start).all():
             return "a start is not finite"
         found = solve_graph(graph.at(start))

@@ -34,7 +34,7 @@ SEEN = 0.4
 
 
 class Rounds(NamedTuple):
-    """A graph at its odometry, the true poses, and which edges ``false (m,)`` are."""
+    """A graph at its odometry, the poses ``true (n, ...)``, and which edges ``false (m,)`` are."""
 
     graph: PoseGraph
     true: Array

@@ -29,7 +29,7 @@ from vslam_ref.estimation.posegraph.spaces import GROUPS, tangent_size
 
 
 class BookGraph(NamedTuple):
-    """Poses where it ended, and chi² at the start and after every step that was tried."""
+    """Poses ``X (n, ...)`` where it ended, and chi² (no unit) at the start and after every step tried."""
 
     X: Array
     chi2: list[float]
@@ -78,7 +78,7 @@ def dense_normal(graph: PoseGraph, X: Array, weight: Callable[[float], float] = 
 
 
 def dense_step(graph: PoseGraph, X: Array, lam: float = 0.0) -> Array:
-    """One damped step of all poses, (n, d); zero for those that are fixed."""
+    """One damped step of poses X (n, ...), (n, d) in metres and radians; zero for fixed ones."""
     d = tangent_size(graph.space)
     H, g, _ = dense_normal(graph, X)
     free = np.repeat(~graph.fixed, d)

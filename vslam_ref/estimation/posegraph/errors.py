@@ -39,7 +39,10 @@ CONVENTIONS: tuple[Convention, ...] = ("log", "g2o")
 
 
 class EdgeErrors(NamedTuple):
-    """Errors ``e (..., d)``, and their Jacobians ``J_tail``, ``J_head (..., d, d)`` in steps on the right."""
+    """Errors ``e (..., d)``, and their Jacobians in steps on the right, metres and radians.
+
+    ``J_tail (..., d, d)`` is that of the first pose, ``J_head (..., d, d)`` that of the second.
+    """
 
     e: Array
     J_tail: Array
@@ -53,7 +56,7 @@ def edge_error(tail: Array, head: Array, measured: Array, *, space: Space, conve
     ----------
     tail, head : ndarray, shape (..., 3) or (..., 4, 4)
         Poses T_world_i and T_world_j.
-    measured : ndarray
+    measured : ndarray, shape (..., 3) or (..., 4, 4)
         T_i_j of the edge.
     space : {"se2", "se3", "sim3"}
     convention : {"log", "g2o"}
@@ -78,7 +81,14 @@ def edge_error_with_jacobians(
 ) -> EdgeErrors:
     """Error of edges and its Jacobians in steps on the right, X Exp(delta).
 
-    Parameters are those of :func:`edge_error`.
+    Parameters
+    ----------
+    tail, head : ndarray, shape (..., 3) or (..., 4, 4)
+        Poses T_world_i and T_world_j.
+    measured : ndarray, shape (..., 3) or (..., 4, 4)
+        T_i_j of the edge.
+    space : {"se2", "se3", "sim3"}
+    convention : {"log", "g2o"}
 
     Returns
     -------

@@ -132,6 +132,8 @@ class PoseGraph:
 def parts(n: int, tail: IntArray, head: IntArray) -> IntArray:
     """Number of the connected part of each of ``n`` nodes, (n,), counted from the first node on.
 
+    Edges join ``tail (m,)`` with ``head (m,)``; nodes are counts without a unit.
+
     Examples
     --------
     >>> parts(5, np.array([0, 3]), np.array([1, 4])).tolist()

@@ -32,7 +32,7 @@ ORDERINGS = ("MMD_AT_PLUS_A", "COLAMD", "bandwidth")
 
 
 class Ordering(NamedTuple):
-    """An order of elimination: nodes ``order (k,)``, its name, and ``products``, the cost of its factor."""
+    """An order of elimination: nodes ``order (k,)``, its name, and ``products``, a count: the cost."""
 
     order: IntArray
     name: str
@@ -53,7 +53,7 @@ def choose_ordering(k: int, a: IntArray, b: IntArray, names: tuple[str, ...] = O
     Returns
     -------
     Ordering
-        The one with the least sum of squared column lengths of its factor; of equals the first.
+        The one with the least sum of squared column lengths of its factor (a count); of equals the first.
 
     Examples
     --------
@@ -109,9 +109,9 @@ class Pattern:
     d : int
         Coordinates of a node.
     ordering : Ordering
-    indptr, indices : ndarray of int
+    indptr, indices : ndarray of int, shapes (k d + 1,) and (entries,)
         Of the matrix (k d, k d), all its entries, column by column.
-    gather : ndarray of int
+    gather : ndarray of int, shape (entries,)
         Each entry's place in the sums of blocks, which are (blocks, d, d).
     selection : csr_array, shape (blocks, 4 m)
         Adds the contributions of edges to blocks: A^T A, B^T B, A^T B, B^T A of each.
@@ -178,9 +178,10 @@ def make_pattern(
     d: int,
     ordering: Ordering | None = None,
 ) -> Pattern:
-    """Find the pattern of ``n`` nodes with ``d`` coordinates each, for edges ``tail``, ``head (m,)``.
+    """Find the pattern of ``n`` nodes with ``d`` coordinates each.
 
-    An ``ordering`` that was found for other sizes of the same nodes is used again.
+    Edges are ``tail (m,)`` and ``head (m,)``, nodes ``fixed (n,)`` have no place; all are counts.  An
+    ``ordering`` that was found for other sizes of the same nodes is used again.
     """
     free = np.flatnonzero(~fixed)
     number = np.full(n, -1)

@@ -65,7 +65,7 @@ def scales(space: Space, T: Array) -> Array:
 
 
 def joined(space: Space, R: Array, t: Array, s: Array) -> Array:
-    """Elements from rotations, translations and (of Sim(3)) scales."""
+    """Elements from rotations R (..., k, k), translations t (..., k) in metres, and scales s (...)."""
     if space == "se2":
         return np.concatenate([t, so2.log(R)[..., None]], -1)
     return se3.from_rt(R, t) if space == "se3" else sim3.from_srt(s, R, t)

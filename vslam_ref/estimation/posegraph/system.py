@@ -34,7 +34,10 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 class GraphPlace(NamedTuple):
-    """Poses, the whitened errors ``r (m, d)`` there, their squares and their costs (m,)."""
+    """Poses ``T_world (n, ...)``, the whitened errors ``r (m, d)`` there (in sigmas), and what they cost.
+
+    ``squares (m,)`` is the chi² of each edge, ``costs (m,)`` what the loss makes of it.
+    """
 
     T_world: Array
     r: Array
@@ -44,7 +47,7 @@ class GraphPlace(NamedTuple):
 
 @dataclass
 class GraphModel:
-    """The graph at a place; its normal equations are added up when they are first needed."""
+    """The graph at a place; its normal equations (in sigmas) are added up when they are first needed."""
 
     problem: GraphProblem
     place: GraphPlace
@@ -119,7 +122,7 @@ class GraphProblem:
     judged : ndarray of bool, shape (m,)
         Edges that the loss is for; all others are squared.
     negligible : float
-        Weight below which an edge is left out of the matrix.
+        Weight, a share, below which an edge is left out of the matrix.
     """
 
     graph: PoseGraph
