@@ -217,6 +217,10 @@ def test_rounded_quaternions_raise_no_note(tmp_path: Path) -> None:
         ("hello\n", ": no known line and no edge; expected lines of g2o"),
         ("", ": no known line and no edge; expected lines of g2o"),
         (
+            EXPMAP.replace("3 0.05 1 1 0 0", "3 5e7 1 1 0 0"),
+            ":2: VERTEX_SIM3:EXPMAP has a scale out of e^-8",
+        ),
+        (
             EXPMAP.replace("3 0.05 1 1 0 0", "3 9.05 1 1 0 0"),
             ":2: VERTEX_SIM3:EXPMAP has a scale out of e^-8",
         ),

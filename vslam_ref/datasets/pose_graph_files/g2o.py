@@ -52,7 +52,7 @@ def _similar(x: Array) -> Poses:
 
 def _from_log(x: Array) -> Poses:
     xi = x[:, ROTATION_FIRST]
-    xi[:, 6] = np.clip(xi[:, 6], -700.0, 700.0)
+    xi[:, 6] = np.clip(xi[:, 6], -9.0, 9.0)  # beyond 8 the reader refuses it
     return Poses(sim3.exp(xi), np.zeros(len(x)))
 
 
