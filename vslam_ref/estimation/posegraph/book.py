@@ -46,6 +46,8 @@ class DenseNormal(NamedTuple):
 def dense_normal(graph: PoseGraph, X: Array, weight: Callable[[float], float] = lambda c: 1.0) -> DenseNormal:
     """Add up the normal equations edge by edge.
 
+    Implements :eq:`eq-graph-normal`.
+
     Parameters
     ----------
     graph : PoseGraph
@@ -62,8 +64,8 @@ def dense_normal(graph: PoseGraph, X: Array, weight: Callable[[float], float] = 
     H, g, chi2 = np.zeros((d * len(X), d * len(X))), np.zeros(d * len(X)), 0.0
     for i, j, Z, Omega in zip(graph.tail, graph.head, graph.measured, graph.information, strict=True):
         M = group.between(X[i], X[j])
-        e = group.log(group.between(Z, M))
-        B = group.left_jacobian_inverse(-e)
+        e = group.log(group.between(Z, M))  # eq-edge-error
+        B = group.left_jacobian_inverse(-e)  # eq-edge-jacobians
         A = -B @ group.adjoint(group.inverse(M))
         c = float(e @ Omega @ e)
         w, at_i, at_j = weight(c), slice(d * i, d * i + d), slice(d * j, d * j + d)
@@ -90,6 +92,8 @@ def dense_step(graph: PoseGraph, X: Array, lam: float = 0.0) -> Array:
 
 def pose_graph(graph: PoseGraph, iterations: int = 20, lam: float = 1e-4) -> BookGraph:
     """Minimise chi² = sum e' Omega e by Levenberg-Marquardt.
+
+    Implements :eq:`eq-graph-chi2`.
 
     Parameters
     ----------

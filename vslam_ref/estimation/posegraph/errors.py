@@ -52,6 +52,8 @@ class EdgeErrors(NamedTuple):
 def edge_error(tail: Array, head: Array, measured: Array, *, space: Space, convention: Convention) -> Array:
     """Error of edges, (..., d): what the poses say less what was measured.
 
+    Implements :eq:`eq-edge-error`, and by option :eq:`eq-g2o-error`.
+
     Parameters
     ----------
     tail, head : ndarray, shape (..., 3) or (..., 4, 4)
@@ -80,6 +82,8 @@ def edge_error_with_jacobians(
     tail: Array, head: Array, measured: Array, *, space: Space, convention: Convention
 ) -> EdgeErrors:
     """Error of edges and its Jacobians in steps on the right, X Exp(delta).
+
+    Implements :eq:`eq-edge-jacobians`.
 
     Parameters
     ----------

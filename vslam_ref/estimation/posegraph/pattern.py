@@ -42,6 +42,8 @@ class Ordering(NamedTuple):
 def choose_ordering(k: int, a: IntArray, b: IntArray, names: tuple[str, ...] = ORDERINGS) -> Ordering:
     """Order ``k`` nodes, joined by pairs ``a (m,)``, ``b (m,)``, for a sparse factor of few products.
 
+    Implements :eq:`eq-graph-products`.
+
     Parameters
     ----------
     k : int

@@ -149,6 +149,8 @@ def solve_graph(
 ) -> GraphSolution:
     r"""Minimise :math:`\chi^2 = \sum e^\top \Omega e` of a pose graph, or the sum of a robust loss.
 
+    Implements :eq:`eq-graph-chi2`.
+
     Parameters
     ----------
     graph : PoseGraph
@@ -245,6 +247,8 @@ def _descended(
 
 def honest_limit(found: GraphSolution) -> float:
     """Return the chi² that one honest edge in 1000 exceeds, by what the kept edges show.
+
+    Implements :eq:`eq-honest-limit`.
 
     A switch gives up an edge at c = 4, which one honest edge of four exceeds in the plane if its covariance
     is right, and hardly any if it is pessimistic, as most are.  Which of both the kept edges tell: chi² per

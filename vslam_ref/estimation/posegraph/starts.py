@@ -97,6 +97,8 @@ def _tree(graph: PoseGraph) -> tuple[IntArray, Array]:
 def chordal_start(graph: PoseGraph) -> Array:
     """Poses by the chordal relaxation, shape of ``graph.T_world``; fixed nodes stay.
 
+    Implements :eq:`eq-chordal-rotations` and :eq:`eq-chordal-positions`.
+
     Examples
     --------
     >>> square = np.array([[1.0, 0.0, np.pi / 2]] * 4)

@@ -42,6 +42,8 @@ LIKELY: dict[str, float] = {"se2": 16.266236, "se3": 22.457744, "sim3": 24.32188
 class Switchable(Loss):
     """A switchable constraint, its switch eliminated; c is the root of Xi.
 
+    Implements :eq:`eq-switches` by :eq:`eq-switch-eliminated`.
+
     Examples
     --------
     >>> float(Switchable(2.0).cost(2.0)), float(GemanMcClure(2.0).cost(2.0).round(12))
@@ -73,6 +75,8 @@ class Switchable(Loss):
 @dataclass(frozen=True)
 class DynamicCovariance(Loss):
     """Dynamic covariance scaling; c is the root of Phi.
+
+    Implements :eq:`eq-other-switches`, on the left.
 
     Examples
     --------
@@ -106,6 +110,8 @@ class DynamicCovariance(Loss):
 @dataclass(frozen=True)
 class MaxMixture(Loss):
     """Either honest or meaningless: the lesser of c and k + nu c; the constant is the root of k.
+
+    Implements :eq:`eq-other-switches`, on the right.
 
     Examples
     --------

@@ -23,6 +23,8 @@ BATCH = 64
 def marginal_covariances(graph: PoseGraph, nodes: ArrayLike, *, convention: Convention = "log") -> Array:
     """Covariance of each of some nodes, all others unknown too.
 
+    Implements :eq:`eq-graph-marginal`.
+
     Parameters
     ----------
     graph : PoseGraph
