@@ -27,9 +27,9 @@ four tell false loops: these are rejected, the others solved once more by least 
 then is taken back. A loop is an edge between vertices that are not neighbours in the order of their ids.
 
 conventions: log (the error of an edge is the whole logarithm, the default), g2o (translation and angle, in
-space the quaternion's vector part, as g2o has it: another chi², not a better one)
+space the quaternion's vector part, as g2o has it: another chi2, not a better one)
 
-chi² is the sum of e^T Omega e, without one half: at the start of all edges, at the end of those not rejected.
+chi2 is the sum of e^T Omega e, without one half: at the start of all edges, at the end of those not rejected.
 The first vertex of every part is held, or those that FIX names.
 
 examples, after 'vslam-ref sample posegraph --out samples':

@@ -34,6 +34,6 @@ def starts_figure(noises: Array, starts: Sequence[str], share: Array, begun: Arr
         left.set(xlabel="noise, times a good sensor's", ylabel="share of graphs", ylim=(-0.03, 1.06))
         left.set(title="ends in the best known minimum")
         right.set(xlabel="noise, times a good sensor's", ylabel="chi² (no unit)", title="chi² at the start")
-        right.legend(loc="upper right")
+        right.legend(loc="center right")
         left.legend(loc="lower left")
     return figure
