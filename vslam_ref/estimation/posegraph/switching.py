@@ -3,14 +3,14 @@ r"""Losses that tell false loops from true ones: switches, dynamic covariance sc
 With :math:`c = e^\top\Omega e`, the square of an edge's error x in standard deviations, and half a square as
 the house's cost of a small error:
 
-==================  ============================================  ==============================  ===========
-loss                cost times 2                                  weight                          false above
-==================  ============================================  ==============================  ===========
-switchable          least of s² c + Xi (1 - s)² over s            s², s = Xi / (Xi + c)           c = Xi
-Geman-McClure       Xi c / (Xi + c)                               (Xi / (Xi + c))²                c = Xi
-DCS                 c, beyond Phi: Phi (3c - Phi) / (c + Phi)     s², s = min(1, 2 Phi/(Phi + c)) c = 3 Phi
-max-mixture         the lesser of c and k + nu c                  1 or nu                         c = k
-==================  ============================================  ==============================  ===========
+=============  =========================================  ===============================  ===========
+loss           cost times 2                               weight                           false above
+=============  =========================================  ===============================  ===========
+switchable     least of s² c + Xi (1 - s)² over s         s², s = Xi / (Xi + c)            c = Xi
+Geman-McClure  Xi c / (Xi + c)                            (Xi / (Xi + c))²                 c = Xi
+DCS            c, beyond Phi: Phi (3c - Phi) / (c + Phi)  s², s = min(1, 2 Phi/(Phi + c))  c = 3 Phi
+max-mixture    the lesser of c and k + nu c               1 or nu                          c = k
+=============  =========================================  ===============================  ===========
 
 The first two are one loss: the switch s of an edge meets nothing but its own error, so its best value can be
 written down, and what is left is Geman-McClure with Xi = (constant of the loss)².  DCS takes twice that
