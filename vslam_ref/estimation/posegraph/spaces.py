@@ -1,13 +1,12 @@
 """The three spaces in which the poses of a graph live, by the names that the house uses for them.
 
-=========  =========================  =================  =========  ==============================
-name       an element                 a pose graph of    tangents   its module
-=========  =========================  =================  =========  ==============================
-``se2``    (x, y, theta)              a robot on a floor 3          :mod:`~vslam_ref.geometry.se2`
-``se3``    4 x 4, rotation            anything in space  6          :mod:`~vslam_ref.geometry.se3`
-``sim3``   4 x 4, scale times         keyframes of one   7          :mod:`~vslam_ref.geometry.sim3`
-           rotation                   camera
-=========  =========================  =================  =========  ==============================
+========  =============================  ====================  ========  =============================
+name      an element                     a pose graph of       tangents  its module
+========  =============================  ====================  ========  =============================
+``se2``   (x, y, theta)                  a robot on a floor    3         :mod:`~vslam_ref.geometry.se2`
+``se3``   4 x 4, rotation                anything in space     6         :mod:`~vslam_ref.geometry.se3`
+``sim3``  4 x 4, scale times rotation    one camera's views    7         :mod:`~vslam_ref.geometry.sim3`
+========  =============================  ====================  ========  =============================
 
 Tangent vectors are (translation, rotation, log-scale), metres and radians.
 """
