@@ -64,7 +64,7 @@ CHAPTERS = (
     Chapter(10, "Tracking", "From images to a map", "systems/ptam/tracker", "10_tracking"),
     Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper", "11_mapping"),
     Chapter(12, "PTAM", "From images to a map", "systems/ptam", "12_ptam"),
-    Chapter(13, "Pose graphs", "Closing loops", "estimation/posegraph"),
+    Chapter(13, "Pose graphs", "Closing loops", "estimation/posegraph", "13_pose_graphs"),
     Chapter(14, "ORB-SLAM", "Closing loops", "systems/orbslam"),
     Chapter(15, "Ackermann EKF-SLAM", "Filters", "filters/ekf_slam", "15_ekf_slam"),
     Chapter(16, "IEKF-SLAM", "Filters", "filters/carleman_ekf", "16_carleman_ekf"),

@@ -24,6 +24,7 @@ MAKES = {
     "run iekf-slam": "out/robot/report.html",
     "run ptam": "out/desk/report.html",
     "ba": "scene.ply",
+    "posegraph": "rounds.svg",
     "calibrate": "camera.yaml",
     "grid": "out/office/report.html",
     "reproduce": "out/index.html",

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import bundle_samples
 import cv2
 import numpy as np
+import pose_graph_samples
 import scipy.io
 from sequence_samples import CALIB, LAYOUTS, SIZE
 
@@ -507,6 +508,10 @@ SAMPLES: dict[str, list[Sample]] = {
             lambda folder: (folder / "data.csv", folder / "sensor.yaml"),
             check=trajectory_wrong,
         )
+    ],
+    "pose_graph_files.reading:read_pose_graph": [
+        Sample(_one("graph.g2o", text), check=pose_graph_samples.pose_graph_wrong)
+        for text in pose_graph_samples.TEXTS.values()
     ],
     "trajectories.reading:read": [
         Sample(_one("path.txt", TUM), check=trajectory_wrong),

@@ -36,6 +36,7 @@ MAKERS = {
     "trajectory": "trajectory:make",
     "adapter": "adapter:make",
     "video": "video:make",
+    "posegraph": "posegraph:make",
 }
 """Kind -> module and function in ``commands.samples``."""
 LIST = "sample.json"

@@ -19,6 +19,7 @@ KINDS = {
     "trajectory": "an estimated and a true trajectory (TUM)",
     "adapter": "a program that answers conformance vectors (Python), and others to start from",
     "video": "a rendered film of a desk, its camera and its true path (PNG, AVI, TUM)",
+    "posegraph": "pose graphs of a robot's rounds, one with false loops, and their true poses (g2o)",
 }
 """Name -> what it is.  The place in this table is part of a kind's seed: new kinds go to the end."""
 
