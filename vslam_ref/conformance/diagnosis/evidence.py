@@ -25,6 +25,8 @@ Ask = Callable[[str, dict[str, Any]], Any]
 Guess = Callable[[Case, Answer], Answer | None]
 MOST = 0.5
 """A name explains more than this share of the failures."""
+CARRYING = 2
+"""Failures that carry a known mistake, at least, where there are so many: each mistake stands in some cases only."""
 NEARER = 0.1
 """An answer that explains another is nearer to it than the right one by this factor."""
 SCREENED = 3
@@ -148,6 +150,15 @@ def repairs(evidence: Evidence, repair: Guess) -> Test:
 def mostly(evidence: Evidence, repair: Guess) -> Test:
     """As :func:`repairs`, where other mistakes may stand beside: an undeclared convention."""
     return _count(evidence, lambda seen: _right(seen.case, repair(seen.case, seen.got)), share=0.0)
+
+
+def carried(evidence: Evidence, note: Guess) -> Test:
+    """Test a known mistake, whose answer only some cases carry: as :func:`predicts`, by these cases alone."""
+    those = [seen for seen in evidence.failed if note(seen.case, seen.got)]
+    if len(those) < min(CARRYING, len(evidence.failed)):
+        return NO
+    found = predicts(evidence._replace(failed=those), note)
+    return found if found is NO else found._replace(explained=len(evidence.failed))
 
 
 def predicts(evidence: Evidence, formula: Guess) -> Test:

@@ -16,6 +16,7 @@ from vslam_ref.conformance.diagnosis.evidence import (
     Evidence,
     Guess,
     Test,
+    carried,
     gather,
     mostly,
     predicts,
@@ -40,7 +41,7 @@ class Family(NamedTuple):
 
 
 FAMILIES = (
-    Family(noted, predicts),
+    Family(noted, carried),
     Family(declared, mostly),
     Family(formulas, predicts),
     Family(spoiled, predicts),
