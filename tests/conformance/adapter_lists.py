@@ -156,7 +156,7 @@ def verified(name: str, files: list[VectorFile], declared: Convention | None = N
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return run(program, files, convention(name) if declared is None else declared)
+            return run(program, files, convention(name) if declared is None else declared, names=False)
     finally:
         program.close()
 

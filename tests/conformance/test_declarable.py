@@ -125,7 +125,7 @@ def report(table: dict[str, Callable[..., Any]], function: str, convention: Conv
     module = ModuleType("theirs")
     module.answer = lambda name, inputs: answer_from(table, name, inputs)  # type: ignore[attr-defined]
     file = some(FILES[function.partition(".")[0]], lambda case: case.function == function)
-    return run(InProcess(module), [file], convention)
+    return run(InProcess(module), [file], convention, names=False)
 
 
 CASES = [(name, value, function) for (name, value), table in PROGRAMS.items() for function in table]

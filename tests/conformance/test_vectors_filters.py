@@ -101,13 +101,13 @@ def failures(report: Report) -> list[str]:
 @pytest.mark.parametrize("name", FILES)
 def test_a_program_of_closed_formulas_passes(name: str) -> None:
     """A second oracle: Jacobians typed in where the generator differentiates, in doubles."""
-    assert failures(run(program(), [loaded(name)])) == []
+    assert failures(run(program(), [loaded(name)], names=False)) == []
 
 
 @pytest.mark.parametrize(("name", "function", "note"), MISTAKES)
 def test_every_mistake_is_told_by_its_name(name: str, function: str, note: str) -> None:
     file = some(name, lambda case: case.function == function and note in listed(case))
-    outcomes = run(program(wrong=note), [file]).outcomes
+    outcomes = run(program(wrong=note), [file], names=False).outcomes
     for o in outcomes:
         if o.case.result != "convention":
             assert o.status == "failed", f"{o.case.id} does not tell {note} from the right answer"
@@ -135,7 +135,7 @@ def test_no_mistake_equals_another_or_the_right_answer(name: str, function: str)
 @pytest.mark.parametrize("step", [0, 3, 5])
 def test_a_trace_that_goes_astray_is_told_with_its_step_and_quantity(name: str, step: int) -> None:
     file = some(name, lambda case: case.function.endswith("trace"))
-    for outcome in run(program(spoiled=step), [file]).outcomes:
+    for outcome in run(program(spoiled=step), [file], names=False).outcomes:
         assert outcome.status == "failed"
         assert outcome.difference is not None
         assert outcome.difference.where == f"step {step}, P"
@@ -162,7 +162,7 @@ def test_an_answer_with_a_flipped_sign_fails(name: str) -> None:
     module = ModuleType("flipped")
     ids = iter(file.cases)
     module.answer = lambda function, inputs: answers[next(ids).id]  # type: ignore[attr-defined]
-    outcomes = run(InProcess(module), [file]).outcomes
+    outcomes = run(InProcess(module), [file], names=False).outcomes
     assert {o.case.id for o in outcomes if o.status == "passed"} == zero
     assert len(zero) <= 5  # log odds of 1/2, cells at the origin: nothing to flip
 

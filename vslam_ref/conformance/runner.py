@@ -30,6 +30,8 @@ def run(
     convention: Convention | None = None,
     profile: Profile = "float64",
     progress: Callable[[Outcome], None] | None = None,
+    *,
+    names: bool = True,
 ) -> Report:
     """Ask every case of some files.
 
@@ -47,6 +49,8 @@ def run(
         Which tolerances.
     progress : callable, optional
         Called after each case.
+    names : bool
+        Whether each function that fails is looked at as a whole, and asked again, to name its mistake.
     """
     began, outcomes = time.perf_counter(), list[Outcome]()
     chosen = [(file, case) for file in files for case in file.cases if is_asked(case, profile)]
@@ -64,7 +68,7 @@ def run(
                 progress(outcome)
             if stopped := patience.judge(case.function, reply, asked.alive):
                 break
-        if not stopped:
+        if names and not stopped:
             named, notes = _named_functions(outcomes, _asking(asked, declared), profile)
     except KeyboardInterrupt:
         stopped = INTERRUPTED
