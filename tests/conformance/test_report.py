@@ -316,7 +316,7 @@ def test_the_page_is_of_bounded_size() -> None:
     assert bad > 2000
     shown = verification_page(report)
     assert f"{bad} in all. {page_module.MOST_FAILURES} are shown: --json has all." in shown
-    assert len(shown) < 2_500_000
+    assert len(shown) < 3_000_000  # failures are cut; the table has a line for each of some 700 regimes
     assert len(report.numbers()["failures"]) == bad
     assert len(text(report, "")) < 30_000
 
