@@ -26,7 +26,9 @@ Guess = Callable[[Case, Answer], Answer | None]
 MOST = 0.5
 """A name explains more than this share of the failures."""
 CARRYING = 2
-"""Failures that carry a known mistake, at least, where there are so many: each mistake stands in some cases only."""
+"""Failures that carry a known mistake, at least: each mistake stands in some cases only."""
+FEW = 5
+"""Of so few failures one is enough: the cases of such functions are long."""
 NEARER = 0.1
 """An answer that explains another is nearer to it than the right one by this factor."""
 SCREENED = 3
@@ -155,7 +157,7 @@ def mostly(evidence: Evidence, repair: Guess) -> Test:
 def carried(evidence: Evidence, note: Guess) -> Test:
     """Test a known mistake, whose answer only some cases carry: as :func:`predicts`, by these cases alone."""
     those = [seen for seen in evidence.failed if note(seen.case, seen.got)]
-    if len(those) < min(CARRYING, len(evidence.failed)):
+    if len(those) < (1 if len(evidence.failed) <= FEW else CARRYING):
         return NO
     found = predicts(evidence._replace(failed=those), note)
     return found if found is NO else found._replace(explained=len(evidence.failed))
