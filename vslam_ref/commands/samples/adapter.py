@@ -43,4 +43,4 @@ def make(folder: Path, rng: np.random.Generator) -> Made:
     program = "python samples/adapter/my_slam_adapter.py"
     declared = "--convention samples/adapter/convention.json"
     commands = tuple(f'vslam-ref verify --program "{p}" {declared}' for p in (program, f"{program} --wrong"))
-    return Made(README, commands, {"mistake": "small-angle-sign"})
+    return Made(README, commands, {"mistake": "right-jacobian", "where": "the length of phi is below 0.1"})
