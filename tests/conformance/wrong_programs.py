@@ -174,7 +174,7 @@ SECOND = [
     Wrong("so3.exp", B, "[v[2], 0.0, -v[0]]", "[v[2], 0.0, v[0]]", r"\(1, 2\)|sign|minus"),
     Wrong("so3.log", B, "if n < 1e-12:", "if n < 1e-4:", "zero|digits|small|left|below|1/2|nothing"),
     Wrong("so3.log", B, "2 * np.arctan2(n, q[0]) / n * q[1:]", "2 * np.arctan2(n, q[0]) / n * q[1:] * [1, 1, -1]", "entry 2"),
-    Wrong("so3.log", B, "    q = quaternion_from_rotation(R)\n", "    q = quaternion_from_rotation(R.T)\n", "sign|transposed|invert"),
+    Wrong("so3.log", B, "    q = quaternion_from_rotation(R)\n", "    q = quaternion_from_rotation(R.T)\n", "sign|transposed|invert|vectors.*rows"),
     Wrong("so3.log", B, "2 * np.arctan2(n, q[0]) / n * q[1:]", "2 * np.arccos(min(q[0], 1.0)) / n * q[1:]", "digits|small|below"),
     Wrong("so3.left_jacobian", B, "np.eye(3) + b * W + c * W @ W", "np.eye(3) + b * W", r"hat\(phi\)\^2"),
     Wrong("so3.left_jacobian", B, "    _, b, c = weights(np.linalg.norm(phi))", "    b, c, _ = weights(np.linalg.norm(phi))", "exponential"),

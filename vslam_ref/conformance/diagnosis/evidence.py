@@ -146,12 +146,12 @@ def repairs(evidence: Evidence, repair: Guess) -> Test:
 
     A passed case must stay right, too: a program whose every sign is flipped passes nothing but zeros.
     """
-    return _count(evidence, lambda seen: _agrees(seen.case, repair(seen.case, seen.got)))
+    return _count(evidence, lambda seen: agrees(seen.case, repair(seen.case, seen.got)))
 
 
 def mostly(evidence: Evidence, repair: Guess) -> Test:
     """As :func:`repairs`, where other mistakes may stand beside: an undeclared convention."""
-    return _count(evidence, lambda seen: _agrees(seen.case, repair(seen.case, seen.got)), share=0.0)
+    return _count(evidence, lambda seen: agrees(seen.case, repair(seen.case, seen.got)), share=0.0)
 
 
 def carried(evidence: Evidence, note: Guess) -> Test:
@@ -174,13 +174,13 @@ def predicts(evidence: Evidence, formula: Guess) -> Test:
         answer = formula(seen.case, seen.got)
         if not answer:
             return None
-        return _agrees(like(seen.case, answer), seen.got)
+        return agrees(like(seen.case, answer), seen.got)
 
     def explained(seen: AnsweredCase) -> bool | None:
         answer = formula(seen.case, seen.got)
         if not answer:
             return None
-        if not _agrees(like(seen.case, answer), seen.got):
+        if not agrees(like(seen.case, answer), seen.got):
             return False
         if _right(seen.case, answer):
             return False
@@ -239,7 +239,7 @@ def _right(case: Case, answer: Answer | None) -> bool:
     return _verdict(case, answer) == "passed"
 
 
-def _agrees(case: Case, answer: Answer | None) -> bool:
+def agrees(case: Case, answer: Answer | None) -> bool:
     """Whether an answer is right but for digits that common formulas lose: they may be lost beside a mistake."""
     return _verdict(case, answer) != "failed"
 
