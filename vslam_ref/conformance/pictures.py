@@ -1,11 +1,11 @@
 """Where a picture tells more than a list: the error of a function's answers over one number of its inputs.
 
-====================  ==========================================================================
-functions             the number
-====================  ==========================================================================
-of rotations, motions the angle of the rotation; of two (``interpolate``), the angle between them
-of cameras            the angle of the point from the optical axis
-====================  ==========================================================================
+======================  ========================================================================
+functions               the number
+======================  ========================================================================
+of rotations, motions   the angle of the rotation; of two (``interpolate``), the angle between them
+of cameras              the angle of the point from the optical axis
+======================  ========================================================================
 """
 
 from __future__ import annotations
