@@ -18,10 +18,11 @@ from vslam_ref.commands.options import (
     warm,
     write_json,
 )
+from vslam_ref.commands.steps import StepTable
 
 if TYPE_CHECKING:
     from vslam_ref.datasets.bundle_files import BundleFile
-    from vslam_ref.estimation.bundle import BundleProblem, BundleResult, Iteration, Robust
+    from vslam_ref.estimation.bundle import BundleProblem, BundleResult, Robust
 
 HELP = "adjust a bundle: cameras and points from their images"
 EPILOG = """\
@@ -109,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
     with _kernels.use_backend(options.backend) as backend:
         warm("bundle", "bundle_schur")  # compiling is no part of the time
         wall, cpu = time.perf_counter(), time.process_time()
-        result = bundle_adjust(file.problem, robust, settings, _Table())
+        result = bundle_adjust(file.problem, robust, settings, StepTable())
         spent = {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
         why = likely_misread(file, result, lambda other: bundle_adjust(other, robust, settings))
     if result.reason in HOPELESS:
@@ -223,24 +224,6 @@ def _problem(file: BundleFile, options: argparse.Namespace) -> BundleProblem:
         names = () if words == ["none"] else tuple(words)
         problem = replace(problem, free=freedom(problem.model, problem.scene, intrinsics=names))
     return fix_gauge(problem) if options.gauge == "fixed" else problem
-
-
-class _Table:
-    """One line an iteration."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self, step: Iteration) -> None:
-        if self.count == 0:
-            print(f"{'step':>4} {'cost':>16} {'decrease':>10} {'gradient':>9} {'damping':>8} {'gain':>7}")
-        self.count += 1
-        mark = "" if step.accepted else "  refused"
-        print(
-            f"{self.count:>4} {step.cost:>16.6f} {step.decrease:>10.3g} {step.gradient_norm:>9.2g} "
-            f"{step.damping:>8.1g} {step.gain:>7.3f}{mark}",
-            flush=True,
-        )
 
 
 def _numbers(result: BundleResult) -> dict[str, Any]:

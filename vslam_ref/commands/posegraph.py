@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vslam_ref.commands.options import add_json, add_set, file_target, json_target, print_notes, write_json
+from vslam_ref.commands.steps import StepTable
 
 if TYPE_CHECKING:
     from vslam_ref.arrays import Array, BoolArray
     from vslam_ref.datasets.pose_graph_files import PoseGraphFile
-    from vslam_ref.estimation.least_squares import Iteration
     from vslam_ref.estimation.posegraph import GraphSolution
 
 HELP = "solve a pose graph: poses from what was measured between them"
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
         judged=judged,
         convention=options.convention,
         options=settings,
-        progress=_Table(),
+        progress=StepTable("2 x cost", 2.0),
     )
     seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     if found.reason in HOPELESS:
@@ -152,24 +152,6 @@ def _start_poses(file: PoseGraphFile, start: str) -> Array:
     if start == "file":
         return file.graph.T_world
     return odometry_start(file.graph) if start == "odometry" else chordal_start(file.graph)
-
-
-class _Table:
-    """One line a step."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self, step: Iteration) -> None:
-        if self.count == 0:
-            print(f"{'step':>4} {'2 x cost':>16} {'decrease':>10} {'gradient':>9} {'damping':>8} {'gain':>7}")
-        self.count += 1
-        mark = "" if step.accepted else "  refused"
-        print(
-            f"{self.count:>4} {2.0 * step.cost:>16.6f} {2.0 * step.decrease:>10.3g} "
-            f"{step.gradient_norm:>9.2g} {step.damping:>8.1g} {step.gain:>7.3f}{mark}",
-            flush=True,
-        )
 
 
 def _numbers(file: PoseGraphFile, found: GraphSolution) -> dict[str, Any]:

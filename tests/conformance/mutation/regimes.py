@@ -18,7 +18,7 @@ import copy
 from collections.abc import Iterator
 from typing import TypeGuard
 
-from mutation.sites import Carry, Change, Mutant
+from mutation.sites import Carry, Change, Mutant, changed, listed
 
 GUARDS = ("clip", "maximum", "minimum", "copysign", "nan_to_num")
 FLIPS: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -31,20 +31,12 @@ FLIPS: dict[type[ast.cmpop], type[ast.cmpop]] = {
 
 def regime_mutants(module: str, source: str) -> list[Mutant]:
     """All changes of the regimes of a module's functions."""
-    tree = ast.parse(source)
-    return [
-        Mutant(module, name, getattr(node, "lineno", 0), number, text)
-        for number, (name, node, text) in enumerate(_changes(tree))
-    ]
+    return listed(module, source, _changes)
 
 
 def with_regime(source: str, number: int) -> str:
     """Source with one change made."""
-    tree = copy.deepcopy(ast.parse(source))
-    for at, _ in enumerate(_changes(tree, number)):
-        if at == number:
-            break
-    return ast.unparse(ast.fix_missing_locations(tree))
+    return changed(source, number, _changes)
 
 
 def _changes(tree: ast.Module, make: int | None = None) -> Iterator[tuple[str, ast.AST, str]]:

@@ -9,8 +9,7 @@ the axes of arrays, nor the order of a matrix and itself.
 from __future__ import annotations
 
 import ast
-import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 SWAPPED_CALLS = {"sin": "cos", "cos": "sin", "minimum": "maximum", "maximum": "minimum", "tan": "sin"}
@@ -40,19 +39,32 @@ class Mutant(NamedTuple):
     text: str
 
 
+Changes = Callable[..., Iterator[tuple[str, ast.AST, str]]]
+"""A walk through a module: function, node and text of every change; with a number, it makes that one."""
+
+
 def mutants(module: str, source: str) -> list[Mutant]:
     """All changes of the functions of a module that cite an equation."""
-    tree = ast.parse(source)
-    return [
-        Mutant(module, function, getattr(node, "lineno", 0), number, text)
-        for number, (function, node, text) in enumerate(_changes(tree))
-    ]
+    return listed(module, source, _changes)
 
 
 def mutated(source: str, number: int) -> str:
     """Source with one change made."""
-    tree = copy.deepcopy(ast.parse(source))
-    for at, _ in enumerate(_changes(tree, number)):
+    return changed(source, number, _changes)
+
+
+def listed(module: str, source: str, changes: Changes) -> list[Mutant]:
+    """All changes that a walk through a module's tree finds."""
+    return [
+        Mutant(module, function, getattr(node, "lineno", 0), number, text)
+        for number, (function, node, text) in enumerate(changes(ast.parse(source)))
+    ]
+
+
+def changed(source: str, number: int, changes: Changes) -> str:
+    """Source with one of them made."""
+    tree = ast.parse(source)
+    for at, _ in enumerate(changes(tree, number)):
         if at == number:
             break
     return ast.unparse(ast.fix_missing_locations(tree))
