@@ -170,15 +170,17 @@ def from_polar(polar: Any, sigma_range: float, sigma_bearing: float, wrong: str 
 
 def yaw_rate(x: Any, control: Any, dt: float, wrong: str = "") -> Answer:
     (px, py, th), (v, omega) = x, control
-    if wrong:
+    if wrong == "exact-arc":
         return velocity_arc(x, control, dt)
+    if wrong:
+        return yaw_rate([px, py, th + omega * dt], [v, 0.0], dt)
     return {"x": [px + v * dt * np.cos(th), py + v * dt * np.sin(th), wrap(th + omega * dt)]}
 
 
 def velocity_arc(x: Any, control: Any, dt: float, wrong: str = "") -> Answer:
     (px, py, th), (v, omega) = x, control
     if wrong:
-        return yaw_rate(x, control, dt)
+        return yaw_rate(x, control, dt, "" if wrong == "ahead-then-turn" else wrong)
     chord, middle = v * dt * np.sinc(omega * dt / 2 / np.pi), th + omega * dt / 2
     return {"x": [px + chord * np.cos(middle), py + chord * np.sin(middle), wrap(th + omega * dt)]}
 

@@ -206,6 +206,8 @@ def ray_cells(start: Any, end: Any, wrong: str = "") -> Answer:
     a, b = [Fraction(v) for v in start], [Fraction(v) for v in end]
     if wrong == "bresenham":
         return {"cells": _bresenham(start, end)}
+    if a == b:
+        return {"cells": [[floor(a[0]), floor(a[1])]]}
     found = []
     for i in range(floor(min(a[0], b[0])), floor(max(a[0], b[0])) + 1):
         for j in range(floor(min(a[1], b[1])), floor(max(a[1], b[1])) + 1):

@@ -71,6 +71,8 @@ def nearest_essential(M: Array, wrong: str | None = None) -> Array:
     U = M @ V[:, 1:] / np.sqrt(values[1:])
     if wrong == "unequal-singular-values":
         U = U * np.sqrt(2 * values[1:] / values[1:].sum())
+    if wrong == "singular-values-kept":
+        U = U * np.sqrt(values[1:])
     E = U @ V[:, 1:].T
     return E.T if wrong == "transposed" else E
 

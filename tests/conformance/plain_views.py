@@ -264,11 +264,15 @@ def rpe(estimate: Array, truth: Array, wrong: str | None = None) -> Any:
     inv = np.linalg.inv
 
     def steps(path: Array) -> Array:
-        if wrong == "right-for-left":
+        if wrong in ("right-for-left", "right-for-left-other-side"):
             return path[1:] @ inv(path[:-1])
         return inv(path[:-1]) @ path[1:]
 
     E = inv(steps(truth)) @ steps(estimate)
+    if wrong in ("other-side", "right-for-left-other-side"):
+        E = steps(estimate) @ inv(steps(truth))
+    if wrong == "absolute":
+        E = inv(truth) @ estimate
     shift = np.linalg.norm(E[:, :3, 3], axis=1)
     if wrong == "in-the-world":
         shift = np.linalg.norm(np.diff(estimate[:, :3, 3], axis=0) - np.diff(truth[:, :3, 3], axis=0), axis=1)

@@ -22,7 +22,7 @@ from vslam_ref.conformance.adapters.table import answer_from, plain
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.diagnosis import NOTHING, diagnose
 from vslam_ref.conformance.diagnosis.evidence import Evidence, gather, mostly, repairs
-from vslam_ref.conformance.diagnosis.one_change import exchanged
+from vslam_ref.conformance.diagnosis.exchange import exchanged
 from vslam_ref.conformance.program import InProcess
 from vslam_ref.conformance.runner import ask as ask_case
 from vslam_ref.conformance.runner import run

@@ -10,6 +10,7 @@ from typing import Any
 import plain_filters as ekf
 import plain_grids as grids
 import plain_lift as lifted
+import plain_sigma as sigma
 import pytest
 from generator.writing import generate
 from vector_cases import listed, loaded, mistakes, size, some
@@ -29,6 +30,9 @@ PROGRAM = {
     "ekf.predict_additive": ekf.predict_additive,
     "ekf.gate": ekf.gate,
     "range_bearing.update": ekf.update_polar,
+    "sigma_points.points": sigma.points,
+    "sigma_points.predict": sigma.predict,
+    "sigma_points.update": sigma.update,
     "ekf.predict": ekf.predict,
     "ekf.update": ekf.update,
     "ekf.augment": ekf.augment,
@@ -69,6 +73,7 @@ PROGRAM = {
 FILES = [
     "15/ekf.json",
     "15/range_bearing.json",
+    "15/sigma_points.json",
     "15/vehicle.json",
     "16/carleman.json",
     "16/lift.json",

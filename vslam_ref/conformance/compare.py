@@ -90,6 +90,8 @@ def numbers(value: Any) -> Array:
     [1.0, inf, 1.0]
     """
     if isinstance(value, list | tuple):
+        if (plain := _at_once(value)) is not None:
+            return plain
         parts = [numbers(v) for v in value]
         if len({part.shape for part in parts}) > 1:
             raise ValueError("rows of different lengths")
@@ -103,6 +105,15 @@ def numbers(value: Any) -> Array:
     if isinstance(value, np.ndarray):
         return value.astype(np.float64)
     raise ValueError(f"{type(value).__name__} is not a number")
+
+
+def _at_once(value: list[Any] | tuple[Any, ...]) -> Array | None:
+    """Array of nested lists that hold nothing but numbers and truth values; None for all others."""
+    try:
+        found = np.array(value)
+    except (ValueError, OverflowError, RecursionError):
+        return None
+    return found.astype(np.float64) if found.dtype.kind in "fiub" else None
 
 
 def compare(case: Case, got: dict[str, Any], profile: Profile = "float64") -> Difference:

@@ -12,6 +12,7 @@ from vslam_ref.conformance.catalogue import Function, functions
 from vslam_ref.conformance.compare import Profile, compare, is_asked, refused
 from vslam_ref.conformance.conventions import Convention
 from vslam_ref.conformance.diagnosis import diagnose, known_mistake, name_functions
+from vslam_ref.conformance.diagnosis.evidence import ALL_EFFORT
 from vslam_ref.conformance.patience import Patience
 from vslam_ref.conformance.replies import Asked, Reply, raised
 from vslam_ref.conformance.results import Outcome, Report, Status
@@ -22,6 +23,7 @@ __all__ = ["Outcome", "Report", "Status", "ask", "run"]
 
 INTERRUPTED = "interrupted"
 MOST_LOST_AGAIN = 2
+SHARED = "many functions are wrong, and fewer guesses were tried for each: --function NAME tries all for one"
 
 
 def run(
@@ -201,6 +203,7 @@ def _named_functions(
 ) -> tuple[dict[str, str], list[str]]:
     """Function -> what is wrong with it; names are a help, and their failure must not lose the report."""
     try:
-        return name_functions(outcomes, once_more, profile), []
+        named = name_functions(outcomes, once_more, profile)
+        return named, [SHARED] if len(named) > ALL_EFFORT else []
     except Exception as error:
         return {}, [f"no names of whole functions: {raised(error)}"]

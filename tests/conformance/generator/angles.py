@@ -28,6 +28,8 @@ AXES = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0], [2 / 3, -1 / 3, 2 / 3],
 EPS, EPS32 = 2.0**-52, 2.0**-23
 MOST, MOST32 = 1e-5, 1e-2
 """Fewer digits than five, or two in single precision, are not lost: that answer is wrong."""
+FIRST_ORDER = 0.1
+"""Share of a term of first order that may be lost."""
 
 
 def angle_grid(angles: list[float]) -> list[float]:
@@ -40,7 +42,9 @@ def vector_grid(angles: list[float], start: int = 0) -> list[Array]:
     return [digits(a * AXES[(k + start) % len(AXES)]) for k, a in enumerate(angles)]
 
 
-def losing(rule: dict[str, Any], distance: float, power: int, reason: str) -> dict[str, Any]:
+def losing(
+    rule: dict[str, Any], distance: float, power: int, reason: str, *, zero: bool = False
+) -> dict[str, Any]:
     """Tolerance of a case whose common formula loses 4 eps over a power of a distance from a special value.
 
     Parameters
@@ -53,8 +57,13 @@ def losing(rule: dict[str, Any], distance: float, power: int, reason: str) -> di
         1 or 2.
     reason : str
         The formula.
+    zero : bool
+        The distance is from zero, and the answer has a term of first order in it.  A branch that leaves this
+        term out, or has another sign there, is a mistake: in double precision no more than a tenth of it
+        counts as lost digits.
     """
-    wide, wide32 = (_loss(eps, distance, power, most) for eps, most in ((EPS, MOST), (EPS32, MOST32)))
+    most = min(MOST, FIRST_ORDER * distance) if zero else MOST
+    wide, wide32 = (_loss(eps, distance, power, m) for eps, m in ((EPS, most), (EPS32, MOST32)))
     single, out = rule["float32"], dict(rule)
     if wide > rule["relative"] + rule["absolute"]:
         out["lost_digits"] = lost_digits(wide, reason, absolute=rule["absolute"])

@@ -108,6 +108,13 @@ def _sizes(topic: Topic, rng: np.random.Generator) -> None:
         ):
             del case["mistakes"]
             topic.group(f"bundle.{name}", equation, oracle, rule, [case], flags=("any_size",))
+    reason = "sums of products of Jacobians and residuals, the latter from pixels of some hundreds"
+    rule, oracle = (
+        tolerance(1e-11, reason, float32=1e-2),
+        "central differences of the definition, 50 digits",
+    )
+    cases = [normal_case(rng, model, n) for model, n in (("pinhole", 1), ("pinhole", 3), ("radtan", 5))]
+    topic.group("bundle.normal_equations", "eq-ba-blocks", oracle, rule, cases, flags=("any_size",))
 
 
 def _seen(model: str, k: list[Any], T: Any, X: Any) -> list[Any]:

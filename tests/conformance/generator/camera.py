@@ -11,7 +11,7 @@ from mpmath import mpf
 
 from generator.building import Topic, tolerance
 from generator.exact import floats, vector
-from generator.lens_grid import every_omega, every_radius, stopping
+from generator.lens_grid import every_omega, every_radius, narrow, stopping
 from generator.lens_slopes import SLOPES, in_intrinsics, in_pixel, in_point, jacobians
 from generator.lenses import (
     EQUATIONS,
@@ -111,6 +111,9 @@ def build(rng: np.random.Generator) -> Topic:
     cases = [{key: value for key, value in case.items() if key != "mistakes"} for case in cases]
     flags = ("fisheye", "beyond_90")
     topic.group("camera.jacobian_point", "eq-jacobian-point", SLOPES, slopes, cases, flags=flags)
+    for model in LENSES:
+        rule = stopping(_inverse_rule(), model)
+        narrow(topic, rng, model, SimpleNamespace(**{**vars(made), "rule": rule, "inverse": _inverse_of(model)}))
     return topic
 
 

@@ -73,13 +73,15 @@ def yaw_rates(topic: Topic, rng: np.random.Generator) -> None:
         inputs = {"x": x, "control": [v, omega], "dt": 0.25}
         pose, ds, turn = big(x), mpf(v) * mpf(0.25), mpf(omega) * mpf(0.25)
         step, arc = wrapped(moved(pose, stack([ds, turn]))), wrapped(_arc(pose, ds, turn))
+        turned = wrapped(moved(stack([*pose[:2], pose[2] + turn]), stack([ds, mpf(0)])))
         far = max(abs(a - b) for a, b in zip(step, arc, strict=True)) > 1e-6
         for out, right, note, other in (
             (steps, step, "exact-arc", arc),
             (arcs, arc, "ahead-then-turn", step),
         ):
             case: dict[str, Any] = {"inputs": inputs, "expected": {"x": doubles(right)}}
-            out.append({**case, "mistakes": {note: {"x": doubles(other)}}} if far else case)
+            wrong = {note: {"x": doubles(other)}, "turn-then-ahead": {"x": doubles(turned)}}
+            out.append({**case, "mistakes": wrong} if far else case)
     topic.group("vehicle.yaw_rate", "eq-increment", ORACLE, rule, steps)
     topic.group("vehicle.velocity_arc", "eq-increment", ORACLE, rule, arcs)
 

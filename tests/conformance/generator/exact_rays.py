@@ -40,6 +40,16 @@ def rays(topic: Topic, rng: np.random.Generator) -> None:
         flags = (flag,) if flag else ()
         oracle = "crossings as fractions, without rounding"
         topic.group("grid.ray_cells", "eq-a4-2", oracle, exact, cases, flags=flags)
+    still = [np.array(p) for p in ([0.25, 0.5], [-3.5, 2.75], [1.0, -2.0])]
+    cases = [
+        {
+            "inputs": {"start": p, "end": p},
+            "expected": {"cells": [np.floor(p).astype(int).tolist()]},
+            "accept": [{"cells": []}],
+        }
+        for p in still
+    ]
+    topic.group("grid.ray_cells", "eq-a4-2", "the cell that holds it", exact, cases, flags=("no_length",))
 
 
 def _point(rng: np.random.Generator, reach: int) -> Array:

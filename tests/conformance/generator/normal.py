@@ -13,15 +13,15 @@ from generator.groups import SE3, Array, motion
 from generator.lenses import camera, project, ray
 
 
-def normal_case(rng: np.random.Generator, model: str) -> dict[str, Any]:
-    """Two points with full covariances, some pixels off."""
+def normal_case(rng: np.random.Generator, model: str, n: int = 2) -> dict[str, Any]:
+    """Points with full covariances, some pixels off."""
     params, pose = camera(rng, model), motion(rng)
     k, T = vector(params), matrix(pose)
-    X_cam = np.stack([ray(rng, 0.05, 0.5) for _ in range(2)])
+    X_cam = np.stack([ray(rng, 0.05, 0.5) for _ in range(n)])
     X = np.array([floats(list(T**-1 * mpmath.matrix([*vector(x), 1])))[:3] for x in X_cam])
     exact = [_seen(model, k, T, vector(x)) for x in X]
-    uv = np.array(floats(exact)) + rng.normal(0, 2.0, (2, 2))
-    half = rng.normal(0, 1.0, (2, 2, 2)) + 1.5 * np.eye(2)
+    uv = np.array(floats(exact)) + rng.normal(0, 2.0, (n, 2))
+    half = rng.normal(0, 1.0, (n, 2, 2)) + 1.5 * np.eye(2)
     cov = half @ np.swapaxes(half, 1, 2)
     cov = 0.5 * (cov + np.swapaxes(cov, 1, 2))
     right = _blocks(model, k, T, X, uv, cov)
@@ -30,7 +30,7 @@ def normal_case(rng: np.random.Generator, model: str) -> dict[str, Any]:
         "covariance-not-inverted": _blocks(
             model, k, T, X, uv, np.asarray(np.linalg.inv(cov), dtype=np.float64)
         ),
-        "covariance-ignored": _blocks(model, k, T, X, uv, np.tile(np.eye(2), (2, 1, 1))),
+        "covariance-ignored": _blocks(model, k, T, X, uv, np.tile(np.eye(2), (n, 1, 1))),
         "gradient-sign": {**right, **{g: _negative(right[g]) for g in ("g_view", "g_point")}},
     }
     inputs = {"model": model, "params": params, "pose": pose, "X_world": X, "uv": uv, "cov": cov}

@@ -42,6 +42,15 @@ NOTES = {
     ),
     "radians": ("your angle is in radians; degrees are asked for", "angle"),
     "right-for-left": ("your relative pose is T_k+1 T_k^-1", "T_k+1 T_k^-1"),
+    "other-side": (
+        "you put the true step's inverse on the other side: the error is then seen from the next pose",
+        "(A'^-1 B') (A^-1 B)^-1",
+    ),
+    "right-for-left-other-side": (
+        "your steps are T_k+1 T_k^-1, and the true one's inverse stands on the right: all in the world",
+        "(B' A'^-1) (B A^-1)^-1",
+    ),
+    "absolute": ("you compare poses, not steps", "A^-1 A'"),
     "half-angle": ("your angle is that of the quaternion's w, half of the rotation's", "acos w"),
     "accumulated-on-the-left": (
         "you put each new step on the left: a step T_(k-1)_k follows on the right of T_0_(k-1)",
@@ -153,6 +162,9 @@ def _rpe(rng: np.random.Generator, turn: float, n: int) -> dict[str, Any]:
         for path, inv in zip((A, B), inverses, strict=True)
     ]
     other = [a**-1 * b for a, b in zip(*steps, strict=True)]
+    beside = [b * a**-1 for a, b in zip(*steps, strict=True)]
+    own = [inv[k] * matrix(B[k]) for inv in inverses[:1] for k in range(n)]
+    turned = [_step(B, k) * _step(A, k) ** -1 for k in range(n - 1)]
     moved = [_moved(B, k) - _moved(A, k) for k in range(n - 1)]
     angles = [_angle(R) for R in rests]
     wrong = {
@@ -160,6 +172,9 @@ def _rpe(rng: np.random.Generator, turn: float, n: int) -> dict[str, Any]:
         "radians": {**right, "rot_rmse_deg": right["rot_rmse_deg"] * mpmath.pi / 180},
         "half-angle": {**right, "rot_rmse_deg": right["rot_rmse_deg"] / 2},
         "right-for-left": _rms([R[0:3, 3] for R in other], [_angle(R) for R in other]),
+        "right-for-left-other-side": _rms([R[0:3, 3] for R in beside], [_angle(R) for R in beside]),
+        "other-side": _rms([R[0:3, 3] for R in turned], angles),
+        "absolute": _rms([R[0:3, 3] for R in own], [_angle(R) for R in own]),
         "mean-for-root-mean-square": {
             "trans_rmse": sum(mpmath.norm(R[0:3, 3]) for R in rests) / len(rests),
             "rot_rmse_deg": mpmath.degrees(sum(angles) / len(angles)),
@@ -170,9 +185,12 @@ def _rpe(rng: np.random.Generator, turn: float, n: int) -> dict[str, Any]:
 
 def _rest(A: Array, B: Array, k: int) -> Any:
     """(A_k^-1 A_k+1)^-1 (B_k^-1 B_k+1)."""
-    a = matrix(A[k]) ** -1 * matrix(A[k + 1])
-    b = matrix(B[k]) ** -1 * matrix(B[k + 1])
-    return a**-1 * b
+    return _step(A, k) ** -1 * _step(B, k)
+
+
+def _step(path: Array, k: int) -> Any:
+    """T_k^-1 T_k+1."""
+    return matrix(path[k]) ** -1 * matrix(path[k + 1])
 
 
 def _moved(path: Array, k: int) -> Any:

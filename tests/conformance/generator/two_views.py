@@ -22,6 +22,10 @@ NOTES = {
         "you set the smallest singular value to zero and leave the others unequal: not essential",
         "U diag(s_1, s_2, 0) V^T, scaled",
     ),
+    "singular-values-kept": (
+        "you set the smallest singular value to zero and keep the others as they are",
+        "U diag(s_1, s_2, 0) V^T",
+    ),
     "mirrored-accepted": (
         "your translation has the other sign: the points lie behind both cameras",
         "(R, -t)",
@@ -176,7 +180,12 @@ def _nearest(rng: np.random.Generator) -> dict[str, Any]:
     right = U * mpmath.diag([1, 1, 0]) * V
     scale = mpmath.sqrt(2 / (S[0] ** 2 + S[1] ** 2))
     uneven = U * mpmath.diag([S[0] * scale, S[1] * scale, 0]) * V
-    return answers({"M": M.tolist()}, "E", right, {"unequal-singular-values": uneven, "transposed": right.T})
+    wrong = {
+        "unequal-singular-values": uneven,
+        "singular-values-kept": U * mpmath.diag([S[0], S[1], 0]) * V,
+        "transposed": right.T,
+    }
+    return answers({"M": M.tolist()}, "E", right, wrong)
 
 
 def _fundamental(rng: np.random.Generator) -> dict[str, Any]:

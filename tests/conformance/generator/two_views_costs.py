@@ -46,6 +46,9 @@ def cost_groups(topic: Topic, rng: np.random.Generator) -> None:
     cases = [_direction_slope(rng) for _ in range(10)]
     oracle = "central differences of the definition, 50 digits"
     topic.group("two_views.sampson_direction_derivative", "eq-sampson-jacobian", oracle, few, cases)
+    few = tolerance(1e-14, "a sum of a dozen numbers")
+    far = [_msac(rng, far=200.0) for _ in range(4)]
+    topic.group("two_views.truncated_cost", "eq-msac", "definition, 50 digits", few, far, flags="far_outliers")
 
 
 def answers(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:
@@ -209,8 +212,10 @@ def _draws(rng: np.random.Generator, k: int) -> dict[str, Any]:
     return answers({"share": w, "size": m, "confidence": p}, "draws", right, wrong)
 
 
-def _msac(rng: np.random.Generator) -> dict[str, Any]:
+def _msac(rng: np.random.Generator, far: float = 0.0) -> dict[str, Any]:
+    """Some squares; the first two are larger than any power of the limit, on demand."""
     e = digits(rng.exponential(2.0, 12), 6)
+    e[:2] += far
     most = float(digits(rng.uniform(2.0, 6.0), 4))
     squared, c = vector(e), mpf(most)
     wrong = {

@@ -39,6 +39,10 @@ NOTES = {
         "you go ahead and turn then; between two poses with a constant yaw rate lies an arc",
         "x + v dt cos(theta)",
     ),
+    "turn-then-ahead": (
+        "you turn first and go ahead along the new heading",
+        "x + v dt cos(theta + omega dt)",
+    ),
     "exact-arc": (
         "your car drives along the arc; B4 drives along the tangent, then turns",
         "x + L/tan(steering) (sin(theta + turn) - sin(theta))",

@@ -33,6 +33,8 @@ NEARER = 0.1
 """An answer that explains another is nearer to it than the right one by this factor."""
 SCREENED = 3
 """Failed cases that are looked at first."""
+ALL_EFFORT = 5
+"""Functions that may be looked at with all effort; where more are wrong, they share it."""
 CASES_TRIED = 60
 """Cases of a function on which a guess is tested, failed ones and passed ones each."""
 
@@ -61,6 +63,8 @@ class Evidence(NamedTuple):
         Statistical cases.
     ask : callable
         Asks the program once more: (function, inputs) -> outputs or None.
+    effort : float
+        Share of the tries that a single function gets: where many are wrong, each gets less.
     """
 
     function: Function
@@ -72,6 +76,7 @@ class Evidence(NamedTuple):
     errors: list[Outcome]
     random: list[Outcome]
     ask: Ask
+    effort: float = 1.0
 
     @property
     def plain(self) -> list[AnsweredCase]:
@@ -92,7 +97,9 @@ def gather(outcomes: Iterable[Outcome], ask: Ask, profile: Profile = "float64") 
         if outcome.status != "unsupported":
             those[outcome.case.function].append(_in_profile(outcome, profile))
     found = (_of(functions()[name], group, ask) for name, group in those.items() if name in functions())
-    return [evidence for evidence in found if evidence.wrong]
+    wrong = [evidence for evidence in found if evidence.wrong]
+    effort = min(1.0, ALL_EFFORT / max(1, len(wrong)))
+    return [evidence._replace(effort=effort) for evidence in wrong]
 
 
 def _in_profile(outcome: Outcome, profile: Profile) -> Outcome:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 from typing import NamedTuple
 
 from vslam_ref.conformance.compare import Profile
@@ -27,12 +28,17 @@ from vslam_ref.conformance.diagnosis.evidence import (
 from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
-from vslam_ref.conformance.diagnosis.one_change import one_change
+from vslam_ref.conformance.diagnosis.one_change import lines_of, one_change
 from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
 from vslam_ref.conformance.results import NOTHING, Outcome
 
 FEW_PASS = 0.25
 """Where fewer pass, for each that fails, the place of the failures says little: what passes is trivial."""
+
+FEWEST_TRIES, MOST_TRIES = 20, 1000
+"""Guesses of a family that are tried where many functions are wrong: the fewer, the more are."""
+TRIED_LINES = 300_000
+"""Lines of the library that they may run together, for one case."""
 
 
 class Family(NamedTuple):
@@ -118,8 +124,9 @@ def _main(evidence: Evidence) -> str:
 def _searched(evidence: Evidence) -> tuple[str, str]:
     """The guess that explains all failures, or else most; and one that explains all, though some cases escape it."""
     best, most, partly = "", 0, ""
+    tries = _tries(evidence)
     for family in FAMILIES:
-        for sentence, guess in family.guesses(evidence):
+        for sentence, guess in islice(family.guesses(evidence), tries):
             count, against = family.test(evidence, guess)
             if against:
                 if family.guesses is not declared:  # a convention holds in all cases, or it is none
@@ -131,6 +138,14 @@ def _searched(evidence: Evidence) -> tuple[str, str]:
                 return sentence, ""
     left = len(evidence.failed) - most
     return (f"{best} ({left} of {len(evidence.failed)} failures it does not explain)" if best else ""), partly
+
+
+def _tries(evidence: Evidence) -> int | None:
+    """How many guesses of a family are tried; all where few functions are wrong."""
+    if evidence.effort == 1.0:
+        return None
+    lines = max(1, lines_of(evidence, evidence.failed[0].case))
+    return FEWEST_TRIES + int(evidence.effort * min(MOST_TRIES, TRIED_LINES // lines))
 
 
 def _part(evidence: Evidence, sentence: str, count: int, against: list[AnsweredCase]) -> str:

@@ -17,6 +17,7 @@ from vslam_ref.filters.ekf_slam import AnchoredEkf, EkfSlam, IdealEkf, Truth
 from vslam_ref.filters.estimates import SlamFilter
 from vslam_ref.filters.polar_update import update_polar
 from vslam_ref.filters.range_bearing import cartesian_from_polar
+from vslam_ref.filters.sigma_points import predict_pose, sigma_points, update_pose
 from vslam_ref.geometry import se2
 from vslam_ref.grids.landmarks.association import gate
 
@@ -173,6 +174,9 @@ TABLE: Answers = {
     "ekf.predict": _predict,
     "ekf.predict_additive": _predict_additive,
     "ekf.gate": _gate,
+    "sigma_points.points": lambda **inputs: sigma_points(**inputs)._asdict(),
+    "sigma_points.predict": lambda **inputs: predict_pose(**inputs)._asdict(),
+    "sigma_points.update": lambda **inputs: update_pose(**inputs)._asdict(),
     "range_bearing.update": lambda **inputs: update_polar(**inputs)._asdict(),
     "ekf.update": lambda x, P, **seen: _updated(_slam(x, P), **seen),
     # no landmark of the map has the number that is added
