@@ -123,6 +123,8 @@ def se2_adjoint(x: Array, wrong: str | None = None) -> Array:
 
 
 def se2_left_jacobian(xi: Array, wrong: str | None = None) -> Array:
+    if wrong == "turn-forgotten":
+        return np.array([[1, 0, xi[1] / 2], [0, 1, -xi[0] / 2], [0, 0, 1]])
     return group_jacobian(ad_plane(xi), wrong, xi[2])
 
 

@@ -14,7 +14,7 @@ from vslam_ref.conformance.vectors_format import CONVENTION
 
 VERSION = "0.1.0"
 CHANGED = {
-    **dict.fromkeys(("format", "trajectory"), "0.1.1"),  # random inputs of 12 digits
+    **{"format": "0.1.1", "trajectory": "0.1.2", "two_views": "0.1.1"},  # inputs of 12 digits; more notes
     **dict.fromkeys(
         (
             *("multiview", "quaternion", "se2", "se3", "sim3", "so2", "so3", "camera", "loss"),
@@ -22,6 +22,7 @@ CHANGED = {
         ),
         "0.2.0",  # regimes filled: every size, special values, sizes of maps; digits that may be lost
     ),
+    **dict.fromkeys(("se2", "camera", "bundle", "vehicle", "grid"), "0.2.1"),  # a few regimes and notes more
 }
 """Topic -> its version, where its numbers have changed since VERSION."""
 FORMAT = 1

@@ -111,9 +111,10 @@ def build(rng: np.random.Generator) -> Topic:
     cases = [{key: value for key, value in case.items() if key != "mistakes"} for case in cases]
     flags = ("fisheye", "beyond_90")
     topic.group("camera.jacobian_point", "eq-jacobian-point", SLOPES, slopes, cases, flags=flags)
-    for model in LENSES:
+    for model in ("radtan", "rational", "fisheye"):
         rule = stopping(_inverse_rule(), model)
-        narrow(topic, rng, model, SimpleNamespace(**{**vars(made), "rule": rule, "inverse": _inverse_of(model)}))
+        here = SimpleNamespace(**{**vars(made), "rule": rule, "inverse": _inverse_of(model)})
+        narrow(topic, rng, model, here)
     return topic
 
 
