@@ -61,7 +61,11 @@ def test_bearings_behind_are_near_each_other() -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"kappa": -3.0}, "must be positive"), ({"alpha": 0.0}, "must be positive"), ({"cov": -P}, "not positive")],
+    [
+        ({"kappa": -3.0}, "must be positive"),
+        ({"alpha": 0.0}, "must be positive"),
+        ({"cov": -P}, "not positive definite"),
+    ],
 )
 def test_what_has_no_points_is_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):

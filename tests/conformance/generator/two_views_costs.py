@@ -46,9 +46,9 @@ def cost_groups(topic: Topic, rng: np.random.Generator) -> None:
     cases = [_direction_slope(rng) for _ in range(10)]
     oracle = "central differences of the definition, 50 digits"
     topic.group("two_views.sampson_direction_derivative", "eq-sampson-jacobian", oracle, few, cases)
-    few = tolerance(1e-14, "a sum of a dozen numbers")
+    few, oracle = tolerance(1e-14, "a sum of a dozen numbers"), "definition, 50 digits"
     far = [_msac(rng, far=200.0) for _ in range(4)]
-    topic.group("two_views.truncated_cost", "eq-msac", "definition, 50 digits", few, far, flags="far_outliers")
+    topic.group("two_views.truncated_cost", "eq-msac", oracle, few, far, flags="far_outliers")
 
 
 def answers(inputs: dict[str, Any], name: str, right: Any, wrong: dict[str, Any]) -> dict[str, Any]:

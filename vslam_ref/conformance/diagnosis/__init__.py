@@ -10,6 +10,7 @@
                                      |  formulas    well-known wrong formulas
                                      |  turns       the answer turned back
                                      |  changes     an input turned, exchanged, left out
+                                     |  shifts      an input off by one or a half, rows moved
                                      |  one_change  the library with one sign changed
                                      |  sizes, places   digits, entries, regimes
 

@@ -77,7 +77,7 @@ def undone(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     names = list(evidence.function.inputs)
     for name in names:
         for words, change in UNDONE.items():
-            yield f"the input {name} {words}", _asked(evidence, _on(name, change))
+            yield f"the input {name} {words}", _asked(evidence, on(name, change))
         yield from _entries(evidence, name)
     for a, b in combinations(names, 2):
         yield f"the inputs {a} and {b} are exchanged", _asked(evidence, _both(a, b, back=True))
@@ -85,18 +85,18 @@ def undone(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
 
 def _entries(evidence: Evidence, name: str) -> Iterator[tuple[str, Guess]]:
     """One entry of a short input: its sign, its unit; two exchanged."""
-    size = _short(evidence, name)
+    size = short(evidence, name)
     for k in range(size):
-        entry = f"entry {k} of the input {name} is"
-        yield f"{entry} taken with the other sign", _asked(evidence, _on(name, _entry(k, np.negative)))
-        yield f"{entry} taken in degrees", _asked(evidence, _on(name, _entry(k, np.degrees)))
-        yield f"{entry} turned into degrees", _asked(evidence, _on(name, _entry(k, np.radians)))
+        what = f"entry {k} of the input {name} is"
+        yield f"{what} taken with the other sign", _asked(evidence, on(name, entry(k, np.negative)))
+        yield f"{what} taken in degrees", _asked(evidence, on(name, entry(k, np.degrees)))
+        yield f"{what} turned into degrees", _asked(evidence, on(name, entry(k, np.radians)))
     for j, k in combinations(range(size), 2):
         words = f"entries {j} and {k} of the input {name} are exchanged"
-        yield words, _asked(evidence, _on(name, _moved([j, k], [k, j])))
+        yield words, _asked(evidence, on(name, _moved([j, k], [k, j])))
 
 
-def _short(evidence: Evidence, name: str) -> int:
+def short(evidence: Evidence, name: str) -> int:
     """Number of entries of a short list of numbers, else 0."""
     x = array(evidence.failed[0].case.inputs.get(name))
     return x.size if x is not None and x.ndim == 1 and 2 <= x.size <= MOST_ENTRIES else 0
@@ -107,20 +107,20 @@ def lost(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     names = list(evidence.function.inputs)
     for name in names:
         for words, change in LOST.items():
-            yield f"the input {name} {words}", _reference(evidence, _on(name, change))
-        size = _short(evidence, name)
+            yield f"the input {name} {words}", reference(evidence, on(name, change))
+        size = short(evidence, name)
         for k in range(size):
             words = f"entry {k} of the input {name} is left out (as if it were zero)"
-            yield words, _reference(evidence, _on(name, _entry(k, np.zeros_like)))
+            yield words, reference(evidence, on(name, entry(k, np.zeros_like)))
         for j, k in permutations(range(min(6, size)), 2):
             words = f"entry {j} of the input {name} is used for entry {k}"
-            yield words, _reference(evidence, _on(name, _moved([j], [k])))
+            yield words, reference(evidence, on(name, _moved([j], [k])))
     yield from _cut_together(evidence)
     for words, change in UNDONE.items():
         for name in names:
-            yield f"the input {name} {words}", _reference(evidence, _on(name, UNDOES.get(words, change)))
+            yield f"the input {name} {words}", reference(evidence, on(name, UNDOES.get(words, change)))
     for a, b in permutations(names, 2):
-        yield f"{a} is used for {b}", _reference(evidence, _both(a, b, back=False))
+        yield f"{a} is used for {b}", reference(evidence, _both(a, b, back=False))
 
 
 CUTS = {
@@ -138,7 +138,7 @@ def _cut_together(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     for length in sorted(set(lengths.values())):
         names = [name for name, n in lengths.items() if n == length]
         for words, part in CUTS.items():
-            yield f"of {', '.join(names)} {words}", _reference(evidence, _cut(names, part))
+            yield f"of {', '.join(names)} {words}", reference(evidence, _cut(names, part))
 
 
 def _rows_in_all(given: dict[str, Any]) -> int:
@@ -182,7 +182,9 @@ UNDOES: dict[str, Callable[[Array], Any]] = {
 """The changes that are not their own way back, as the program makes them."""
 
 
-def _entry(k: int, change: Callable[[Array], Any]) -> Callable[[Array], Any]:
+def entry(k: int, change: Callable[[Array], Any]) -> Callable[[Array], Any]:
+    """A change of one entry of a list of numbers."""
+
     def changed(x: Array) -> Array:
         out = x.copy()
         out[..., k] = change(out[..., k])
@@ -202,8 +204,8 @@ def _moved(where: list[int], whence: list[int]) -> Callable[[Array], Any]:
     return changed
 
 
-def _on(name: str, change: Callable[[Array], Any]) -> Change:
-    """One input changed."""
+def on(name: str, change: Callable[[Array], Any]) -> Change:
+    """A question with one input changed; ValueError where that makes no sense, or no change."""
 
     def changed(given: dict[str, Any]) -> dict[str, Any]:
         x = array(given[name])
@@ -255,7 +257,7 @@ def _asked(evidence: Evidence, change: Change) -> Guess:
     return repair
 
 
-def _reference(evidence: Evidence, change: Change) -> Guess:
+def reference(evidence: Evidence, change: Change) -> Guess:
     """The library's answer to the changed question; the right one where nothing changes."""
 
     def formula(case: Case, got: Answer) -> Answer | None:

@@ -43,7 +43,7 @@ def exchanged(function: FunctionType, code: CodeType) -> Iterator[None]:
 
 @contextmanager
 def bounded() -> Iterator[list[int]]:
-    """Keep changed code from running for ever, or into all memory: it fails instead, as any wrong code may."""
+    """Keep changed code from running for ever, or into all memory: it fails instead, as wrong code may."""
     before = sys.gettrace()
     left = [MOST_LINES]
 

@@ -29,6 +29,7 @@ from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
 from vslam_ref.conformance.diagnosis.one_change import lines_of, one_change
+from vslam_ref.conformance.diagnosis.shifts import shifted
 from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
 from vslam_ref.conformance.results import NOTHING, Outcome
 
@@ -59,6 +60,7 @@ FAMILIES = (
     Family(scaled, repairs),
     Family(undone, repairs),
     Family(lost, predicts),
+    Family(shifted, predicts),
     Family(one_change, predicts),
 )
 """In this order; the first name that fits is taken."""

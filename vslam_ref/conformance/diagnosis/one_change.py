@@ -1,7 +1,7 @@
 """The library with one change, asked whether it answers as the program does.
 
-Every function that the library runs for an answer is changed in one place at a time (:mod:`.rewriting`).  If the
-changed library answers all cases as the program does, the program has this mistake, in whatever words.
+Every function that the library runs for an answer is changed in one place at a time (:mod:`.rewriting`).  If
+the changed library answers all cases as the program does, the program has this mistake, in whatever words.
 """
 
 from __future__ import annotations

@@ -90,7 +90,9 @@ def _between(a: float, b: float) -> str:
 
 def entries(evidence: Evidence) -> str:
     """Which outputs, rows or entries are wrong, the same in all failed cases; empty if all are."""
-    said, names = [], list(evidence.function.outputs)
+    truths = evidence.failed[0].case.expected
+    names = [name for name in evidence.function.outputs if not isinstance(truths.get(name), bool)]
+    said = []
     whole = 0
     for name in names:
         found = _masks(evidence, name)

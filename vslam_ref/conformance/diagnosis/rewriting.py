@@ -39,7 +39,7 @@ New = ast.expr | dict[str, Any]
 class ChangedLine(NamedTuple):
     """One changed line: the function, its new code, and what is said of it."""
 
-    target: FunctionType
+    target: Any
     code: CodeType
     text: str
 
@@ -134,7 +134,7 @@ def _compiled(tree: ast.Module, function: FunctionType, slip: Slip) -> CodeType 
 def _places(node: ast.AST, statement: ast.stmt) -> Iterator[tuple[ast.stmt, ast.expr]]:
     """Every expression that may be changed, in the order of the text; conditions are left alone."""
     for child in ast.iter_child_nodes(node):
-        if isinstance(child, LEFT_ALONE) or isinstance(child, ast.arguments):
+        if isinstance(child, (*LEFT_ALONE, ast.arguments)):
             continue
         if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant):
             continue
