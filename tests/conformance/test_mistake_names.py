@@ -13,9 +13,11 @@ import plain_estimates
 import plain_filters
 import plain_grids
 import plain_motions
+import plain_short
 import pytest
 from scipy.stats import chi2
 from wrong_programs import FIRST, SECOND, Fate, Wrong, judge, program, true_name, vectors
+from wrong_short import THIRD
 
 from vslam_ref.conformance.adapters import itself
 from vslam_ref.conformance.adapters.table import answer_from, plain
@@ -27,7 +29,9 @@ from vslam_ref.conformance.program import InProcess
 from vslam_ref.conformance.runner import ask as ask_case
 from vslam_ref.conformance.runner import run
 
-QUICK = [FIRST[k] for k in (0, 1, 2, 3, 4, 10, 12, 15, 19, 24, 27, 29, 35, 39, 42, 44, 50, 53, 56)]
+QUICK = [FIRST[k] for k in (0, 1, 2, 3, 4, 10, 12, 15, 19, 24, 27, 29, 35, 39, 42, 44, 50, 53, 56)] + [
+    THIRD[k] for k in (22, 29, 35, 38, 45, 57, 63)
+]
 
 
 @pytest.mark.parametrize("wrong", QUICK, ids=lambda w: f"{w.function}: {w.new[:40]}")
@@ -41,7 +45,7 @@ def test_a_mistake_has_its_name(wrong: Wrong) -> None:
 def test_most_mistakes_have_their_names_and_none_has_another() -> None:
     """Goal: at most 3 % slip, at least 60 % of those caught are named, no name is false."""
     tally: Counter[str] = Counter()
-    for wrong in (*FIRST, *SECOND):
+    for wrong in (*FIRST, *SECOND, *THIRD):
         fate = judge(wrong.function, program(wrong))
         kind = "slips" if fate.slips else "named" if fate.named else "unnamed"
         tally[kind] += 1
@@ -51,10 +55,14 @@ def test_most_mistakes_have_their_names_and_none_has_another() -> None:
     assert tally["named"] >= 0.6 * caught
 
 
-@pytest.mark.parametrize("function", plain_branches.PROGRAM)
-def test_right_programs_pass_and_get_no_name(function: str) -> None:
-    fate = judge(function, plain_branches.PROGRAM[function])
-    assert (fate.failed, fate.name) == (0, "")
+@pytest.mark.parametrize("table", [plain_branches.PROGRAM, plain_short.PROGRAM], ids=["branches", "short"])
+def test_right_programs_pass_and_get_no_name(table: dict[str, Any]) -> None:
+    for function, program_of_it in table.items():
+        assert_right(function, judge(function, program_of_it))
+
+
+def assert_right(function: str, fate: Fate) -> None:
+    assert (function, fate.failed, fate.name) == (function, 0, "")
 
 
 def spoiled(value: Any, count: list[int]) -> Any:

@@ -23,7 +23,7 @@ from vslam_ref.conformance.vectors_format import Case
 MOST_CHANGES = 400
 """Changes of one function of the catalogue that are tried, of each kind."""
 ALL_LINES = 150_000
-"""Lines that all changes of a kind together may run for one case: the slower a function, the fewer are tried."""
+"""Lines that all changes of a kind may run for one case: the slower a function, the fewer are tried."""
 
 
 def one_change(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
