@@ -10,16 +10,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from vslam_ref.datasets.calibration_files import CameraFile, read_camera_info, read_ptam, read_tum_mono
 from vslam_ref.datasets.calibration_files.camera_info import from_message
+from vslam_ref.datasets.calibration_files.camodocal import from_camodocal
 from vslam_ref.datasets.calibration_files.euroc import from_sensor
 from vslam_ref.datasets.calibration_files.kalibr import from_chain
+from vslam_ref.datasets.calibration_files.kitti_raw import read_kitti_raw
 from vslam_ref.datasets.calibration_files.opencv_storage import from_entries
 from vslam_ref.datasets.calibration_files.orbslam import from_settings
+from vslam_ref.datasets.calibration_files.ost import read_ost
 from vslam_ref.datasets.calibration_files.ptam import VARIABLE
 from vslam_ref.datasets.storage_nodes import GZIP, parse_storage, storage_bytes
 from vslam_ref.datasets.text import FormatError, decoded, number, numbers, read_bytes, read_lines
@@ -28,12 +32,13 @@ from vslam_ref.geometry.cameras import Pinhole
 
 PLAIN = ("fx", "fy", "cx", "cy", "width", "height")
 KINDS = (
-    "calib.txt (fx fy cx cy width height), KITTI's calib.txt, OpenCV (YAML, XML, JSON), ROS camera_info, "
-    "ORB-SLAM's settings, Kalibr, EuRoC, PTAM's camera.cfg, TUM monoVO's camera.txt"
+    "calib.txt (fx fy cx cy width height), KITTI's calib.txt and calib_cam_to_cam.txt, OpenCV (YAML, XML, "
+    "JSON), ROS camera_info and ost.txt, ORB-SLAM's settings, Kalibr, EuRoC, camodocal, PTAM's camera.cfg, "
+    "TUM monoVO's camera.txt"
 )
 MESSAGE = {"k", "d", "distortion_model"}
 """Entries of a ROS message, in small letters."""
-KITTI = "P0"
+KITTI, KITTI_RAW = "P0", "K_00"
 MAX_BYTES = 2**20
 LONGEST_SIDE = 2**20
 
@@ -69,6 +74,8 @@ def read_camera(path: Path, size: tuple[int, int]) -> CameraFile:
 
 def _by_content(path: Path, size: tuple[int, int]) -> CameraFile:
     begin = _begin(path)
+    if re.search(rb"^\[image\]\s*$", begin, re.MULTILINE):
+        return read_ost(path)
     if begin.startswith((b"<", b"{", b"[")):
         return _parsed(parse_storage(path, storage_bytes(path)))
     keys = set(re.findall(r"^([A-Za-z_][\w.]*)[ \t]*:", begin.decode("utf-8", "replace"), re.MULTILINE))
@@ -77,6 +84,8 @@ def _by_content(path: Path, size: tuple[int, int]) -> CameraFile:
     lines = list(_lines(path))
     if any(text.startswith(VARIABLE) for _, text in lines):
         return read_ptam(path, size)
+    if KITTI_RAW in keys:
+        return read_kitti_raw(path, size)
     if KITTI in keys:
         return read_kitti_camera(path)
     if keys:
@@ -97,7 +106,11 @@ def _parsed(top: Node) -> CameraFile:
     if "Camera" in keys or any(key.startswith(("Camera.", "Camera1.")) for key in keys):
         return from_settings(top)
     if any(re.fullmatch(r"cam\d", key) for key in keys):
-        return from_chain(top)[0]
+        chain = from_chain(top)
+        told = (f"{top.path}: cam0 of {len(chain)} cameras is read",) if len(chain) > 1 else ()
+        return replace(chain[0], notes=(*told, *chain[0].notes))
+    if "model_type" in keys and "projection_parameters" in keys:
+        return from_camodocal(top)
     if "sensor_type" in keys or "T_BS" in keys:
         return from_sensor(top)
     return from_entries(top)

@@ -31,6 +31,7 @@ from vslam_ref.datasets.bundle_files.colmap.parts import (
     ImagePart,
     Parts,
     PointParts,
+    number_again,
     require_small,
 )
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, counted, load
@@ -135,7 +136,7 @@ def binary_parts(folder: Path, max_bytes: int | None = None) -> Parts:
 def require_new(path: Path, place: FilePlace, name: str, key: int, found: dict[int, Any]) -> None:
     """Refuse a number that an earlier record has."""
     if key in found:
-        raise place.error(path, f"{name} {key} again; expected another")
+        raise place.error(path, number_again(name, key))
 
 
 def _cameras(file: ByteReader) -> dict[int, CameraPart]:

@@ -105,3 +105,9 @@ def require_small(path: Path, place: FilePlace, values: Sequence[float], names: 
     for name, value in zip(names, values, strict=True):
         if not abs(value) < FARTHEST:
             raise place.error(path, f"{name} is {value:g}; expected a number of size less than {FARTHEST:g}")
+
+
+def number_again(name: str, key: int, first: int | None = None) -> str:
+    """What is said of a number that an earlier record has; ``first`` is that record's line, in a text."""
+    where = "" if first is None else f"line {first} has it already, "
+    return f"{name} {key} again; {where}expected another"

@@ -22,6 +22,7 @@ from vslam_ref.datasets.bundle_files.colmap.parts import (
     ImagePart,
     Parts,
     PointParts,
+    number_again,
 )
 from vslam_ref.datasets.bundle_files.loading import FARTHEST, LARGEST, load
 from vslam_ref.datasets.text import FormatError, decoded, is_number, number, read_bytes
@@ -73,8 +74,7 @@ def records(
         name = right.split()[0]
         key = whole(path, line, words[0], name)
         if key in found:
-            what = f"{name} {key} again; line {found[key]} has it already, expected another"
-            raise FormatError(path, line, what)
+            raise FormatError(path, line, number_again(name, key, found[key]))
         found[key] = line
         yield line, key, words
 
