@@ -30,9 +30,9 @@ class SigmaPoints(NamedTuple):
     Attributes
     ----------
     points : ndarray, shape (2n + 1, n)
-        The mean; plus the columns of the root; minus them.
+        The mean; plus the columns of the root; minus them; in the units of the mean.
     w_mean, w_cov : ndarray, shape (2n + 1,)
-        Weights of means, and of covariances.
+        Weights of means, and of covariances; no unit.
     """
 
     points: Array
