@@ -69,5 +69,45 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "sign = -1.0 if variant.b26_as_printed else 1.0",
         "a minus sign left out",
     ): "the row as it is printed, a variant that no vector asks for",
+    (
+        "geometry.multiview.three_points._newton",
+        "d = np.where((after <= np.abs(error).max(axis=-1))[..., None], new, d)",
+        "a threshold 100 times smaller",
+    ): "Newton's steps take off more than that until only rounding is left",
+    (
+        "grids.map_config.MapConfig.__post_init__",
+        '"settle_in_line": (in_line is None or in_line >= 0, "0 s or more, or None"),',
+        "the limit itself on the other side",
+    ): "a check of settings: another test has it",
+    (
+        "geometry.multiview.resection.dlt",
+        "if (state := _narrow(extent)) is not PoseState.OK:",
+        "a branch never taken",
+    ): "what is narrow is flat as well, and refused by the next check",
+    (
+        "estimation.least_squares.descend._try",
+        "blind = downhill and step.promised <= options.rounding * total",
+        "a threshold 100 times larger",
+    ): "how early the last steps, near rounding, are polished",
+    (
+        "estimation.triangulation.triangulate",
+        "pixels = np.where(used[..., None], pixels, 0.0)",
+        "one side for both, the first",
+    ): "numbers of masked views only; the vectors mask none",
+    (
+        "geometry.cameras.projection.project_with_jacobians",
+        "xd = np.where(valid[..., None], xd, 0.0)",
+        "one side for both, the first",
+    ): "what stands beside 'no image': no vector asks for it",
+    (
+        "geometry.alignment._points",
+        "bad = np.flatnonzero(~(np.abs(points) < LARGEST).all(axis=1))  # NaN is not below, either",
+        "a threshold 100 times smaller",
+    ): "a bound of bad input: another test has it",
+    (
+        "estimation.resection._result",
+        "cov_pose=None if spread is None else spread.matrix,",
+        "a branch never taken",
+    ): "a pose without a single pixel: no vector asks for it",
 }
 """(module.function below the package, line, change) -> why it cannot be noticed."""
