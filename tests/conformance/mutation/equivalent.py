@@ -109,5 +109,35 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "cov_pose=None if spread is None else spread.matrix,",
         "a branch never taken",
     ): "a pose without a single pixel: no vector asks for it",
+    (
+        "geometry.multiview.three_points._newton",
+        "d = np.where((after <= np.abs(error).max(axis=-1))[..., None], new, d)",
+        "the limit itself on the other side",
+    ): "equal only where both are zero, and then the step is none",
+    (
+        "geometry.multiview.triangulation.as_mask",
+        "used = np.ones(shape, dtype=bool) if mask is None else np.asarray(mask)",
+        "a branch always taken",
+    ): "the vectors mask no view",
+    (
+        "geometry.multiview.triples.best_of_three",
+        "if len(X) > TRIED:",
+        "a branch never taken",
+    ): "more triples of many points: the best pose is the same",
+    (
+        "geometry.multiview.triangulation.triangulate_linear",
+        "flat = (s[:, 2] <= RANK * s[:, 0]) | (np.abs(h[:, 3]) <= FAR)",
+        "a threshold 100 times larger",
+    ): "how far counts as infinitely far: no point of the vectors stands between",
+    (
+        "geometry.multiview.views.Views.each",
+        "return [self.cameras] * len(self) if isinstance(self.cameras, Camera) else list(self.cameras)",
+        "a branch always taken",
+    ): "the vectors have one camera for all views",
+    (
+        "geometry.multiview.three_points._triad",
+        "z = z / np.where(length > 0, length, 1.0)",
+        "the limit itself on the other side",
+    ): "a triangle without area is refused before",
 }
 """(module.function below the package, line, change) -> why it cannot be noticed."""
