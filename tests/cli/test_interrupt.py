@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from collections.abc import Iterator
 
 import pytest
 
 from vslam_ref import __main__, cli
 
 LINE = "\nvslam-ref: interrupted; no file is half-written\n"
+
+
+@pytest.fixture(autouse=True)
+def handler() -> Iterator[None]:
+    """The answer to Ctrl-C that a fresh interpreter has; what stood before comes back."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_while_a_module_is_loaded(
@@ -27,13 +37,21 @@ def test_while_a_module_is_loaded(
     assert capsys.readouterr().err == LINE
 
 
-def test_inside_the_body_of_a_class(
+def test_an_interrupt_that_a_module_turned_into_another_error(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Python 3.11 makes a RuntimeError of what ``__set_name__`` raises; its cause is the interrupt."""
+    """Python 3.11 makes a RuntimeError of what ``__set_name__`` raises."""
+
+    class Field:
+        def __set_name__(self, owner: type, name: str) -> None:
+            signal.raise_signal(signal.SIGINT)
 
     def run() -> int:
-        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+        try:
+            type("Loaded", (), {"field": Field()})
+        except BaseException as error:
+            raise ImportError("a part is missing") from error
+        return 0
 
     monkeypatch.setattr(cli, "main", run)
     assert __main__.main() == 130
@@ -42,7 +60,7 @@ def test_inside_the_body_of_a_class(
 
 def test_other_errors_stay_what_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> int:
-        raise RuntimeError("of the program") from ValueError()
+        raise RuntimeError("of the program")
 
     monkeypatch.setattr(cli, "main", run)
     with pytest.raises(RuntimeError, match="of the program"):

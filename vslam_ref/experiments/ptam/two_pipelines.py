@@ -41,7 +41,7 @@ RIGHT = 0.5
 SETTLED = 5
 """Pictures after the start that are left out."""
 IDLE = 0.8
-"""Least share of the processor that the tracker must have got while it worked, for latencies to be its own."""
+"""Least share of the processor that the tracker must have while it works, for latencies to be its own."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _real_time(study: Study[LatencyRun]) -> Claim:
         missing = "This machine has one core, or no map began"
     elif got < IDLE:
         missing = (
-            f"Other programs were in the way: the tracker had the processor for {got:.0%} of the time in which "
+            f"Other programs were in the way: the tracker had the processor for {got:.0%} of the time that "
             f"it worked, at least {IDLE:.0%} asked for. Run it again when nothing else runs"
         )
     late = {

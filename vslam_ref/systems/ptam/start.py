@@ -6,7 +6,7 @@ r"""From trails to a first map, or the reason why not yet.
               \                 /
                a picture between               ask_third: which answer it allows
                       |
-            parallax, depths, cost             enough for a map?
+                parallax, cost                 enough for a map?
 """
 
 from __future__ import annotations
