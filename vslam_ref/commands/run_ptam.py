@@ -80,7 +80,7 @@ and with known data sets:
   vslam-ref run ptam new_tsukuba_150 --out out/tsukuba --json tsukuba.json
   vslam-ref run ptam kitti07_head --refine-camera --out out/kitti
   vslam-ref run ptam kitti07_head --camera out/kitti/camera.yaml --out out/kitti2
-  vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
+  vslam-ref run ptam 7scenes_redkitchen --from 0 --to 200 --every 2 --video half --out out/kitchen"""
 VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
 START = "start from pictures I and J, by their numbers in the source (default: the system finds two)"
 CONCURRENT = "mapping in a thread of its own, beside tracking: quicker, but not the same bytes each time"
