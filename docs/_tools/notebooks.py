@@ -116,7 +116,18 @@ def tidy(notebook: NotebookNode, name: str) -> None:
         if cell.cell_type != "code":
             continue
         cell.execution_count = None
-        cell.outputs = [kept for output in cell.outputs if (kept := _tidy_output(output, name))]
+        cell.outputs = _joined([kept for output in cell.outputs if (kept := _tidy_output(output, name))])
+
+
+def _joined(outputs: list[NotebookNode]) -> list[NotebookNode]:
+    """One output of what was printed in several pieces: how many there are depends on the machine's pace."""
+    found: list[NotebookNode] = []
+    for output in outputs:
+        if found and output.output_type == found[-1].output_type == "stream":
+            found[-1].text += output.text
+        else:
+            found.append(output)
+    return found
 
 
 def _tidy_output(output: NotebookNode, name: str) -> NotebookNode | None:

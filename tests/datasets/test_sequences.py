@@ -197,7 +197,7 @@ def test_stamps_that_fall_are_told_and_the_order_stays(tmp_path: Path) -> None:
     stamps[4], stamps[5] = stamps[5], stamps[4]
     text = "".join(f"{t!r}\n" for t in stamps).encode()
     sequence = open_sequence(made(tmp_path, change=lambda files: files.update({"times.txt": text})))
-    assert sequence.notes == ("1 time(s) before the one before, first at picture 5",)
+    assert sequence.notes == ("1 time(s) earlier than the one before, first at picture 5",)
     assert [image.time for image in sequence] == stamps
     assert sequence.pairs().estimate.tolist() == [0, 1, 2, 3, 5, 4, 6, 7, 8, 9, 10, 11]
 

@@ -9,7 +9,14 @@ from vslam_ref.commands import run_ptam
 from vslam_ref.support.config import settings
 from vslam_ref.support.errors import InputError
 from vslam_ref.systems.ptam import Ptam, Quality, Settings, policy
-from vslam_ref.systems.ptam.presets import PRESETS, lines, preset, settings_from
+from vslam_ref.systems.ptam.presets import (
+    PRESETS,
+    Preset,
+    PresetChoice,
+    lines,
+    preset,
+    settings_from,
+)
 from vslam_ref.systems.ptam.settings import KeyframeSettings
 from vslam_ref.systems.visual_map import measure
 
@@ -43,6 +50,15 @@ def test_other_settings_win_in_whatever_order() -> None:
     assert not both.features.warp
     assert not both.mapper.search_back
     assert settings_from([]) == Settings()
+
+
+def test_presets_add_up_and_two_that_disagree_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = [f"preset={name}" for name in PRESETS]
+    assert settings_from(words) == settings_from(words[::-1])  # those that are here agree
+    other = Preset("another gap", (PresetChoice("keyframe.gap", 3, "a test"),))
+    monkeypatch.setitem(PRESETS, "other", other)
+    with pytest.raises(InputError, match=r"keyframe\.gap is 21 in one preset, 3 in other: give one"):
+        settings_from(["preset=ptam2007", "preset=other"])
 
 
 @pytest.mark.parametrize(

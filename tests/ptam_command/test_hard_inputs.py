@@ -57,7 +57,7 @@ def test_bad_pictures_and_odd_times_cost_no_more_than_themselves(
     for words in ("missing: number 9", "damaged: number 10", "wrong size: number 11", "blank: number 12, 13"):
         assert words in told
     assert "equal to the one before" in told
-    assert "note: 1 time(s) before the one before" in capsys.readouterr().out
+    assert "note: 1 time(s) earlier than the one before" in capsys.readouterr().out
 
 
 def test_bad_pictures_at_the_beginning_and_wrong_order_do_not_hinder_the_start(

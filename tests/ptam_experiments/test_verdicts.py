@@ -336,12 +336,12 @@ def test_a_run_without_an_error_is_the_worst() -> None:
 # --- two pipelines --------------------------------------------------------------------------------
 
 
-def latencies(in_line: float, beside: float, error: float = 0.1) -> Study:
+def latencies(in_line: float, beside: float, error: float = 0.1, got: float = 0.95) -> Study:
     """Two of a hundred pictures are this late, the others 10 ms."""
     latency = {way: np.where(np.arange(100) < 2, late, 0.01) for way, late in
                zip(two_pipelines.WAYS, (in_line, beside), strict=True)}  # fmt: skip
     errors = {way: np.full(3, error) for way in two_pipelines.WAYS}
-    return Study(two_pipelines.TwoPipelinesConfig(), None, two_pipelines.LatencyRun(latency, errors))
+    return Study(two_pipelines.TwoPipelinesConfig(), None, two_pipelines.LatencyRun(latency, errors, got))
 
 
 def test_two_pipelines(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -350,10 +350,12 @@ def test_two_pipelines(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(verdicts(two_pipelines.claims(latencies(0.3, 0.1, error=2.0))).values()) == {NO}
     not_needed = verdicts(two_pipelines.claims(latencies(0.02, 0.02, error=np.nan)))
     assert set(not_needed.values()) == {NO}
+    name = "two-pipelines-make-real-time-possible"
+    busy = two_pipelines.claims(latencies(0.3, 0.02, got=0.5))
+    assert verdicts(busy)[name] == OPEN
+    assert "had the processor for 50 % of the time" in busy[0].sentence
     monkeypatch.setattr(two_pipelines, "cores", lambda: 1)
-    assert (
-        verdicts(two_pipelines.claims(latencies(0.3, 0.02)))["two-pipelines-make-real-time-possible"] == OPEN
-    )
+    assert verdicts(two_pipelines.claims(latencies(0.3, 0.02)))[name] == OPEN
 
 
 def test_a_picture_that_waits_is_late_by_that() -> None:
@@ -367,7 +369,9 @@ def test_a_picture_that_waits_is_late_by_that() -> None:
             time.sleep(0.03)
             return SimpleNamespace(tracked=tracked)
 
-    late = two_pipelines.paced(Slow(), [np.zeros(0)] * 20, 100.0)  # type: ignore[arg-type]
+    late, (cpu, wall) = two_pipelines.paced(Slow(), [np.zeros(0)] * 20, 100.0)  # type: ignore[arg-type]
     least = 0.03 + 0.02 * np.arange(two_pipelines.SETTLED, 20)
     assert len(late) == 20 - two_pipelines.SETTLED
     assert (late >= least - 1e-3).all()
+    assert wall >= 20 * 0.03 - 1e-3
+    assert cpu < 0.5 * wall  # it only slept

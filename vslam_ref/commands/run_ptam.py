@@ -41,7 +41,9 @@ last third of the path to the truth over that of the first (below 1: the map gre
 reading and drawing.
 
 --start I,J: corners are followed from picture I to J, and one start is tried there: it holds, or the run ends
-without a map and says why. Pictures between both are tracked afterwards; those before I are not.
+without a map and says why. Pictures between both are tracked afterwards; those before I are not. Choose two
+that show the same things, with the camera moved sideways between them by a tenth of their distance or so: if
+it only turned, or hardly moved, many motions explain the pictures.
 
 --concurrent: the mapper works in a thread of its own, and the tracker waits for it only where a keyframe was
 handed over mapper.lag pictures ago. Paths differ a little from run to run; without it, the same pictures give
@@ -54,8 +56,9 @@ largest and RMS over the picture. Run again with '--camera DIR/camera.yaml' to u
 Ctrl-C saves the run so far and ends with status 130; twice in one stage, it saves nothing. While the film is
 drawn, the first one ends the film.
 A scene that allows no start ends with status 0 and the reason.
-'--set tracker.fine_points=500' changes a setting. '--set preset=NAME' changes several; others given beside it
-win:
+'--set tracker.fine_points=500' changes a setting: at most 500 points are looked for in a picture. The default
+is 1000, but only those in sight count, and few scenes show so many. '--set preset=NAME' changes several
+settings, presets add up, and other settings given beside them win:
   ptam2007        the constants and rules of PTAM as it was published
   no_warp         a patch is compared as it was first seen, on the level that fits its size
   least_squares   the tracker and every adjustment minimise squares instead of Tukey's loss
@@ -77,7 +80,7 @@ and with known data sets:
   vslam-ref run ptam new_tsukuba_150 --out out/tsukuba --json tsukuba.json
   vslam-ref run ptam kitti07_head --refine-camera --out out/kitti
   vslam-ref run ptam kitti07_head --camera out/kitti/camera.yaml --out out/kitti2
-  vslam-ref run ptam 7scenes_redkitchen --from 100 --to 250 --every 2 --video half --out out/kitchen"""
+  vslam-ref run ptam 7scenes_redkitchen --from 0 --to 200 --every 2 --video half --out out/kitchen"""
 VIDEO = "film: 320 pixels wide (small, the default), half or full size of the pictures, or none"
 START = "start from pictures I and J, by their numbers in the source (default: the system finds two)"
 CONCURRENT = "mapping in a thread of its own, beside tracking: quicker, but not the same bytes each time"

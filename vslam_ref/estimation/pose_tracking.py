@@ -213,22 +213,28 @@ def _pinhole_weighed(
     """:func:`_weighed` with a pinhole K (4,) and Tukey's loss, a coordinate of all points at a time."""
     x, y, z = T[:3, :3] @ X.T + T[:3, 3:]
     valid = (z > MIN_DEPTH) & (z < np.inf) & (np.abs(x) < MAX_TAN * z) & (np.abs(y) < MAX_TAN * z)
-    z, root = np.where(valid, z, 1.0), np.where(valid, root, 0.0)
-    a, b = np.where(valid, x, 0.0) / z, np.where(valid, y, 0.0) / z
+    if not valid.all():
+        x, y, z, root = (np.where(valid, *pair) for pair in ((x, 0.0), (y, 0.0), (z, 1.0), (root, 0.0)))
+    a, b = x / z, y / z
     e = np.stack([(K[0] * a + K[2] - u[:, 0]) * root, (K[1] * b + K[3] - u[:, 1]) * root])
     square = e[0] * e[0] + e[1] * e[1]
-    sigma = (
-        max(MAD_NORM_2D * float(np.median(np.sqrt(square[valid]))), least_sigma) if valid.any() else np.inf
-    )
+    sigma = max(MAD_NORM_2D * _median_root(square[valid]), least_sigma) if valid.any() else np.inf
     s = np.maximum(1.0 - square / (c * sigma) ** 2, 0.0)
     w = np.where(valid, s * s, 0.0)
+    root = root * s  # half of the weight to each factor of J^T J
     J, fx, fy, ab = np.zeros((6, 2, len(z))), K[0] * root, K[1] * root, a * b
     fx_z, fy_z = fx / z, fy / z
     J[0, 0], J[2, 0], J[3, 0], J[4, 0], J[5, 0] = fx_z, -a * fx_z, -fx * ab, fx + fx * a * a, -fx * b
     J[1, 1], J[2, 1], J[3, 1], J[4, 1], J[5, 1] = fy_z, -b * fy_z, -fy - fy * b * b, fy * ab, fy * a
-    Jw = (J * w).reshape(6, -1)
-    H, g = Jw @ J.reshape(6, -1).T, Jw @ e.ravel()  # eq-track-normal
+    rows = J.reshape(6, -1)
+    H, g = rows @ rows.T, rows @ (e * s).ravel()  # eq-track-normal
     return _Weighed(H, g, w, sigma, _trouble(H, w))
+
+
+def _median_root(square: Array) -> float:
+    """Median of the roots of n squares, n at least 1: roots keep the order, so two of them are enough."""
+    middle = [(len(square) - 1) // 2, len(square) // 2]
+    return float(np.sqrt(np.partition(square, middle)[middle]).mean())
 
 
 def _trouble(H: Array, w: Array) -> int:

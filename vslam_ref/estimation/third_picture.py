@@ -192,8 +192,8 @@ def _some(chosen: BoolArray) -> BoolArray:
 def _disagreement(pair_cost: float, added: float) -> str:
     if added > RATIO * pair_cost + MARGIN:
         return (
-            f"a picture between does not agree: it adds {added:.3g} an equation to the {pair_cost:.3g} "
-            "of the pair"
+            "a picture between does not agree with the motion of the two: mean squared error "
+            f"{added:.3g} there, {pair_cost:.3g} in the two"
         )
     return ""
 
@@ -204,7 +204,10 @@ def _rival(each: list[ThreeViews], costs: Array, best: int) -> str:
     for k in np.argsort(costs, kind="stable"):
         other = two_views.apart(each[k].T_b_a, each[best].T_b_a) >= SAME_VALLEY
         if other and costs[k] < RATIO * cost + MARGIN:
-            return f"two motions cost {cost:.3g} and {costs[k]:.3g} a point in three pictures: not told apart"
+            return (
+                "two different motions explain three pictures about equally well, with mean squared errors "
+                f"of {cost:.3g} and {costs[k]:.3g}: not told apart"
+            )
     return ""
 
 

@@ -28,6 +28,7 @@ LOST = 1e4 * float(np.finfo(np.float64).eps)
 """Length of an eigenvalue, relative to the largest, up to which its inverse has fewer than four digits."""
 
 _TERMS = 8  # the first one left out is q^8 4! / 20! < 1e-17 of the sum
+_INVERSE_FACTORIAL = tuple(1.0 / factorial(k) for k in range(2 * _TERMS + 4))
 _POWERS = 19  # the first one left out is 190 / 21! < 4e-18, in C at theta = 0, sigma = 1
 
 
@@ -46,11 +47,11 @@ def _by_series(q: Array) -> Array:
     for k in (5, 4):
         total = np.zeros_like(q)
         for n in range(_TERMS - 1, -1, -1):
-            total = 1.0 / factorial(2 * n + k) - q * total
+            total = _INVERSE_FACTORIAL[2 * n + k] - q * total
         c[k] = total
     # eq-coefficients
     for k in (3, 2, 1, 0):
-        c[k] = 1.0 / factorial(k) - q * c[k + 2]
+        c[k] = _INVERSE_FACTORIAL[k] - q * c[k + 2]
     return c
 
 
@@ -59,7 +60,7 @@ def _closed(q: Array) -> Array:
     theta = np.sqrt(q)
     c = [np.cos(theta), np.sin(theta) / theta, 2.0 * np.sin(theta / 2) ** 2 / q]
     for k in (1, 2, 3):
-        c.append((1.0 / factorial(k) - c[k]) / q)
+        c.append((_INVERSE_FACTORIAL[k] - c[k]) / q)
     return np.stack(c)
 
 

@@ -57,7 +57,8 @@ def flow_figure(
 
 def _row(panel: Axes, boxes: Sequence[FlowBox], y: float, colour: str, places: Sequence[int]) -> None:
     for k, (box, place) in enumerate(zip(boxes, places, strict=True)):
-        told = f"{box.pictures} times, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
+        often = "once" if box.pictures == 1 else f"{box.pictures} times"
+        told = f"{often}, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
         _box(panel, place * STEP, y, colour if box.pictures else PALE, box.name, told)
         if k:
             side = np.sign(place - places[k - 1])

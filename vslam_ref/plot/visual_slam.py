@@ -186,15 +186,18 @@ def _time(panel: Axes, course: CourseDrawing) -> None:
     panel.legend(loc="upper right", frameon=False, ncols=2)
 
 
-def pictures_figure(images: Sequence[NDArray[np.uint8]], titles: Sequence[str]) -> Figure:
-    """Draw pictures (H, W, 3) beside each other."""
+def pictures_figure(
+    images: Sequence[NDArray[np.uint8]], titles: Sequence[str], below: Sequence[str]
+) -> Figure:
+    """Draw pictures (H, W, 3) beside each other, with words above and below each."""
     with style.house_style():
         figure, panels = style.new_figure(3.0, len(images))
-        for panel, image, title in zip(panels, images, titles, strict=True):
+        for panel, image, title, words in zip(panels, images, titles, below, strict=True):
             panel.imshow(image, interpolation="antialiased")
             panel.set(xticks=[], yticks=[])
             panel.grid(False)
             panel.set_title(title, fontsize=9)
+            panel.set_xlabel(words, fontsize=8)
     return figure
 
 

@@ -126,5 +126,5 @@ class VideoFile:
             return np.arange(len(stamps)) / rate
         fell = int((np.diff(stamps) < 0).sum())
         if fell:  # pictures come in the order to show them, stamps in the order of decoding
-            self.notes += (f"{fell} time(s) of the video before the one before: sorted",)
+            self.notes += (f"{fell} time(s) of the video earlier than the one before: sorted",)
         return np.sort(stamps)

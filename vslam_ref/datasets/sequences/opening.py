@@ -194,12 +194,14 @@ def _look(folder: Path, pictures: tuple[Path, ...]) -> tuple[tuple[int, int], in
             if size is not None:
                 heads[path] = size
     ranked = Counter(heads.values()).most_common()
-    why = FormatError(folder, None, f"none of {len(some)} pictures can be read")
+    count = f"{len(pictures)} pictures"
+    looked = count if len(some) == len(pictures) else f"the {len(some)} of {count} that were looked at"
+    why = FormatError(folder, None, f"none of {looked} can be read")
     for path, size in sorted(heads.items(), key=lambda item: [s for s, _ in ranked].index(item[1])):
         try:
             found = read_picture(path)
         except FormatError as error:
-            why = FormatError(folder, None, f"none of {len(some)} pictures can be read, as {error}")
+            why = FormatError(folder, None, f"none of {looked} can be read, as {error}")
             continue
         if found.grey.shape == size[::-1]:
             return size, found.bits

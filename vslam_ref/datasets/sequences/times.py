@@ -54,7 +54,7 @@ def odd(times: Array) -> list[str]:
     """
     step = np.diff(times)
     found = []
-    for which, what in ((step == 0, "equal to"), (step < 0, "before")):
+    for which, what in ((step == 0, "equal to"), (step < 0, "earlier than")):
         if which.any():
             first = int(np.argmax(which)) + 1
             found.append(f"{which.sum()} time(s) {what} the one before, first at picture {first}")

@@ -141,6 +141,7 @@ def _only_keyframes(run: FlowRun) -> Claim:
 def _global(run: FlowRun) -> Claim:
     both = _part(run, "global")
     count, keyframes = int(both.sum()), int(run.keyframe.sum())
+    often = "once" if count == 1 else f"{count} times"
     few = keyframes < Settings().mapper.global_every
     return judged(
         "adjustment-of-all-keyframes",
@@ -148,7 +149,7 @@ def _global(run: FlowRun) -> Claim:
         "All keyframes are adjusted together, too",
         "the stage that adjusts all keyframes takes part in at least one picture, in keyframes only",
         None if few else count > 0 and not bool((both & ~run.keyframe).any()),
-        f"With {keyframes} new keyframes, all were adjusted together {count} times"
+        f"With {keyframes} new keyframes, all were adjusted together {often}"
         + (", too few keyframes to tell" if few else ""),
         {"times": count, "keyframes": keyframes},
     )

@@ -201,13 +201,21 @@ def series(study: Study[Fig23Run]) -> dict[str, object]:
     return {"pictures": study.once.numbers} | {k: np.asarray(v) for k, v in study.data._asdict().items()}
 
 
+COLOURS = (
+    "green: from the first picture to this one",
+    "vermilion, yellow, sky blue, blue: levels 0, 1, 2, 3",
+    "white: a grid on the plane",
+)
+"""What the colours in the three pictures mean."""
+
+
 def figure(study: Study[Fig23Run]) -> Figure:
     """The three pictures."""
     from vslam_ref.plot.visual_slam import pictures_figure
 
     words = ("start: corners and how they moved", "points tracked, by level", "a house on the plane found")
     titles = [f"picture {n}: {text}" for n, text in zip(study.once.numbers, words, strict=True)]
-    return pictures_figure(study.once.images, titles)
+    return pictures_figure(study.once.images, titles, COLOURS)
 
 
 EXPERIMENT = Experiment(

@@ -68,6 +68,10 @@ LEGEND = (
     "blue good, orange poor, vermilion lost."
 )
 
+START = (
+    "The start. A rival is another motion that two pictures may allow: an essential matrix gives four, a "
+    "plane two. Each must cost clearly more."
+)
 SPREAD = (
     "σ is the spread of the matches' errors, by their median; the tracker never takes it below "
     "{floor} px (tracker.least_sigma), so that a few exact matches do not outweigh all others."
@@ -236,7 +240,7 @@ def _start(content: Mapping[str, Any]) -> pages.Html | str:
         ["points", str(found["points"]), ""],
     ]
     rows += [[f"rival: {r['answer']}, cost of a point", f"{r['cost']:.4g}", "px²"] for r in found["rivals"]]
-    return pages.table([], rows, caption="The start", kind="numbers")
+    return pages.table([], rows, caption=START, kind="numbers")
 
 
 def _refusals(refusals: Mapping[str, int]) -> pages.Html | str:

@@ -1,6 +1,7 @@
 """Named sets of settings: PTAM as it was published, and the system with one part taken out.
 
-``--set preset=NAME`` takes them all; other settings that are given beside it win, in whatever order.
+``--set preset=NAME`` takes them all; other settings that are given beside it win, in whatever order.  Several
+presets add up; two that want different values of one setting are refused.
 """
 
 from __future__ import annotations
@@ -118,12 +119,12 @@ def preset(name: str, base: Settings | None = None) -> Settings:
 
 
 def settings_from(words: Iterable[str]) -> Settings:
-    """Settings from ``key=value`` words: presets first, in their order, then everything else.
+    """Settings from ``key=value`` words: presets first, then everything else.
 
     Raises
     ------
     InputError
-        If there is no such preset or setting, or a value does not fit.
+        If there is no such preset or setting, a value does not fit, or two presets disagree.
 
     Examples
     --------
@@ -132,12 +133,18 @@ def settings_from(words: Iterable[str]) -> Settings:
     (500, 21)
     """
     made, others = Settings(), []
+    by: dict[str, PresetChoice] = {}
     for word in words:
-        key, equals, value = word.partition("=")
-        if equals and key.strip() == KEY:
-            made = preset(value.strip(), made)
-        else:
+        key, equals, name = (part.strip() for part in word.partition("="))
+        if not (equals and key == KEY):
             others.append(word)
+            continue
+        made = preset(name, made)
+        for choice in PRESETS[name].choices:
+            before = by.setdefault(choice.key, choice)
+            if before.value != choice.value:
+                what = f"{choice.key} is {before.value!r} in one preset, {choice.value!r} in {name}"
+                raise InputError(f"{what}: give one of them, and other settings beside it")
     return apply_overrides(made, others)
 
 

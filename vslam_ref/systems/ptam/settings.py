@@ -69,7 +69,11 @@ class TrackerSettings:
     coarse_points: int = assume(60, "points", "PTAM's 50 to 60, of the two coarsest levels")
     coarse_least: int = assume(15, "points", "fewer found: the next guess is tried")
     coarse_agree: float = assume(0.4, "share", "of the coarse points found: the guess was good")
-    fine_points: int = assume(1000, "points", "PTAM's")
+    fine_points: int = assume(
+        1000,
+        "points",
+        "PTAM's, at most: all that are in sight where those are fewer, as mostly",
+    )
     radius: tuple[float, ...] = assume(
         (10.0, 20.0, 40.0), "px", "constant velocity; small image; small image, wide"
     )

@@ -6,7 +6,7 @@ r"""From trails to a first map, or the reason why not yet.
               \                 /
                a picture between               ask_third: which answer it allows
                       |
-            parallax, depths, cost             enough for a map?
+                parallax, cost                 enough for a map?
 """
 
 from __future__ import annotations
@@ -194,9 +194,9 @@ def _missing(parallax: float, wide: int, cost: float, s: StartSettings) -> str:
     if parallax < s.parallax:
         return f"the rays of a point differ by {parallax:.2f} degrees: need {s.parallax:g}"
     if wide < s.wide_points:
-        return f"{wide} points have {s.wide_parallax:g} degrees of parallax: need {s.wide_points}"
+        return f"the rays of {wide} points differ by {s.wide_parallax:g} degrees: need {s.wide_points} points"
     if cost > s.cost:
-        return f"the cost is {cost:.2f} px^2 a point: at most {s.cost:g}"
+        return f"the mean squared error of the matches is {cost:.3g} px^2: at most {s.cost:g}"
     return ""
 
 

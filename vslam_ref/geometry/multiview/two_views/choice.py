@@ -129,7 +129,7 @@ def choose(
         inliers=at.squared[best] <= ONE_EQUATION,
         front=at.front[best],
         parallax=at.parallax[best],
-        reason=_reason(names[best], float(costs[best]), rivals),
+        reason=_reason(float(costs[best]), rivals),
         answers=answers,
     )
 
@@ -148,8 +148,10 @@ def apart(T: ArrayLike, S: ArrayLike) -> float:
     return max(turn, float(np.arctan2(np.linalg.norm(np.cross(t, s)), t @ s)))
 
 
-def _reason(name: str, cost: float, rivals: list[tuple[str, float]]) -> str:
+def _reason(cost: float, rivals: list[tuple[str, float]]) -> str:
     if rivals and rivals[0][1] < RATIO * cost + MARGIN:
-        other, price = rivals[0]
-        return f"{other} costs {price:.3g} a pair, {name} {cost:.3g}: the pictures do not tell them apart"
+        return (
+            "two different motions explain the pairs about equally well, with mean squared errors of "
+            f"{cost:.3g} and {rivals[0][1]:.3g}: the pictures do not tell them apart"
+        )
     return ""
