@@ -1,4 +1,4 @@
-"""Vectors of chapters 01 to 06, 08 to 10, 23: a plain program passes, every known mistake is told by name."""
+"""Vectors of chapters 01 to 06, 08 to 11, 13 and 23: a plain program passes, mistakes are told by name."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import plain_estimates
 import plain_features
 import plain_mapping
 import plain_motions
+import plain_posegraph
 import plain_tracking
 import plain_two_views
 import plain_views
@@ -33,12 +34,13 @@ PROGRAM: dict[str, Callable[..., Any]] = {
     **plain_features.PROGRAM,
     **plain_mapping.PROGRAM,
     **plain_tracking.PROGRAM,
+    **plain_posegraph.PROGRAM,
     **plain_two_views.PROGRAM,
 }
 FILES = [
     name
     for name in form.names()
-    if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "11", "23")
+    if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "11", "13", "23")
 ]
 MISTAKES = mistakes(FILES)
 MOST_LOST = 3
@@ -66,7 +68,7 @@ def test_all_topics_are_there() -> None:
     assert topics >= {
         *("multiview", "so2", "se2", "so3", "quaternion", "se3", "sim3", "camera", "loss", "scale", "noise"),
         *("least_squares", "bundle", "trajectory", "format", "features", "two_views", "tracking"),
-        "mapping",
+        *("mapping", "posegraph"),
     }
 
 

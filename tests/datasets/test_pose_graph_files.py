@@ -185,11 +185,11 @@ def test_rounded_quaternions_raise_no_note(tmp_path: Path) -> None:
         ),
         (
             SE2.replace("50 -2 1 50 0 100", "50 -60 1 50 0 100"),
-            ":7: EDGE_SE2: information with least eigenvalue -10",
+            ":7: EDGE_SE2: information of edge 1 -> 2 with least eigenvalue -10",
         ),
         (
             SE2.replace("50 -2 1 50 0 100", "0 0 0 50 0 100"),
-            ":7: EDGE_SE2: information with least eigenvalue 0;",
+            ":7: EDGE_SE2: information of edge 1 -> 2 with least eigenvalue 0;",
         ),
         (SE2.replace("FIX 0", "FIX 99"), ":5: FIX names vertex 99, which has no VERTEX line"),
         (SE2.replace("FIX 0", "FIX"), ":5: FIX without a vertex; expected FIX id ..."),
@@ -212,6 +212,10 @@ def test_rounded_quaternions_raise_no_note(tmp_path: Path) -> None:
         (
             SE2 + SE3,
             ":10: VERTEX_SE3:QUAT in a file that has VERTEX_SE2 on line 1; expected poses of one space",
+        ),
+        (
+            "EDGE2 0 1 1 0 0.1 9 0 9\n",
+            ":1: 8 columns after the tag; EDGE2 needs 11: i j x y theta I11 I12 I22 I33 I13 I23",
         ),
         ("VERTEX_SE2 0 0 0 0\n", ": 1 vertices and no edge; expected lines of g2o"),
         ("hello\n", ": no known line and no edge; expected lines of g2o"),

@@ -21,6 +21,7 @@ from vslam_ref.estimation.posegraph.switching import (
     Switchable,
     edge_loss,
 )
+from vslam_ref.estimation.posegraph.system import GraphProblem
 from vslam_ref.estimation.robust import GemanMcClure, Loss
 from vslam_ref.worlds.rounds import RADIUS, make_rounds
 
@@ -190,3 +191,28 @@ def test_a_part_that_hangs_on_false_edges_only_is_held() -> None:
 def test_an_unknown_loss_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown loss 'tukey'; known: l2, huber"):
         edge_loss("tukey", "se2")
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4])
+def test_the_lower_of_two_minima_counts(seed: int) -> None:
+    """A mixture pulls no edge beyond its limit: from the odometry alone, true loops stay out for good.
+
+    From where its rival leads they are within reach, and that end costs less by the mixture's own measure.
+    """
+    made = make_rounds("se2", np.random.default_rng(seed), rounds=3, false_loops=12)
+    rule = edge_loss("max-mixture", "se2")
+    alone, both = (solve_graph(made.graph, one) for one in (rule._replace(rival=None), rule))
+    problem = GraphProblem(made.graph, "log", rule.loss, made.graph.loops)
+    ends = [float(problem.at(found.graph.T_world).costs.sum()) for found in (alone, both)]
+    assert ends[1] < 0.8 * ends[0]
+    assert (alone.rejected & ~made.false).sum() > 10
+    assert (both.rejected == made.false).all()
+    assert len(both.history) > len(alone.history)  # both descents are told
+
+
+def test_a_minimum_that_is_lower_already_is_kept() -> None:
+    """No worse for the second descent: the poses of a graph without false loops are the same to the bit."""
+    made = make_rounds("se2", np.random.default_rng(0), rounds=2, per_round=20)
+    rule = edge_loss("switchable", "se2")
+    alone, both = (solve_graph(made.graph, one) for one in (rule._replace(rival=None), rule))
+    assert (alone.graph.T_world == both.graph.T_world).all()

@@ -15,6 +15,7 @@ EPILOG = "example: vslam-ref bench --quick --json bench.json"
 SUITES = {
     "filters": "vslam_ref.bench.filters",
     "bundle": "vslam_ref.bench.bundle",
+    "posegraph": "vslam_ref.bench.posegraph",
     "grids": "vslam_ref.bench.grids",
     "features": "vslam_ref.bench.features",
     "ptam": "vslam_ref.bench.ptam",

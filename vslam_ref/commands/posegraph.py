@@ -155,6 +155,8 @@ def _start_poses(file: PoseGraphFile, start: str) -> Array:
 
 
 def _numbers(file: PoseGraphFile, found: GraphSolution) -> dict[str, Any]:
+    from vslam_ref._kernels import backend
+
     graph = file.graph
     vertices, edges = graph.sizes
     false = found.rejected.nonzero()[0]
@@ -168,7 +170,7 @@ def _numbers(file: PoseGraphFile, found: GraphSolution) -> dict[str, Any]:
         "reason": found.reason,
         "rejected": int(found.rejected.sum()),
         "rejected_edges": [[int(file.ids[graph.tail[k]]), int(file.ids[graph.head[k]])] for k in false],
-        "backend": "numpy",
+        "backend": backend(),
     }
 
 

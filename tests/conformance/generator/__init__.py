@@ -15,6 +15,7 @@ HELPERS = (
     "angles",
     "ekf_others",
     "ekf_sizes",
+    "edges",
     "lens_grid",
     "solver_runs",
     "exact",

@@ -37,6 +37,8 @@ class Kind:
         Columns that may follow and mean nothing here.
     information : callable, optional
         Of edges: maps numbers (k, d (d + 1)/2) to matrices (k, d, d).
+    entries : tuple of str
+        Columns of the information, where they are not those of an upper triangle row by row.
     """
 
     format: str
@@ -45,6 +47,7 @@ class Kind:
     poses: Callable[[Array], Poses]
     extra: tuple[str, ...] = ()
     information: Callable[[Array], Array] | None = None
+    entries: tuple[str, ...] = ()
 
 
 @dataclass

@@ -88,7 +88,8 @@ def _tables(path: Path, max_bytes: int) -> tuple[Tables, Tables, Table, Counter[
 
 def _add(table: Table, path: Path, line: int, words: list[str], kind: Kind, ends: int) -> None:
     """Add a line to its table."""
-    names = kind.names if ends == 1 else (*kind.names, *information_names(GROUPS[kind.space].DOF))
+    entries = kind.entries or information_names(GROUPS[kind.space].DOF)
+    names = kind.names if ends == 1 else (*kind.names, *entries)
     found = words[1 + ends :]
     longer = (*names, *kind.extra)
     if len(found) not in (len(names), len(longer)):
@@ -180,7 +181,7 @@ class _Assembly:
             k = len(kind.names)
             poses.append(self._poses(tag, kind, values[:, :k], lines[-1]))
             if kind.information is not None:
-                information.append(self._information(tag, kind, values[:, k:], lines[-1]))
+                information.append(self._information(tag, kind, values[:, k:], table))
         order = np.argsort(np.concatenate(lines), kind="stable")
         found = np.concatenate(information)
         kept = found[order] if len(found) else found
@@ -204,7 +205,7 @@ class _Assembly:
             T = np.asarray(GROUPS["se2"].compose(T, np.zeros(3)))  # angles in (-pi, pi]
         return T
 
-    def _information(self, tag: str, kind: Kind, values: Array, lines: IntArray) -> Array:
+    def _information(self, tag: str, kind: Kind, values: Array, table: Table) -> Array:
         """Information of a table's edges; TORO's tags may hold it row by row."""
         assert kind.information is not None
         found = kind.information(values)
@@ -219,9 +220,10 @@ class _Assembly:
         if not good.all():
             k = int(np.argmin(good))
             least = float(np.linalg.eigvalsh(found[k])[0])
-            what = f"least eigenvalue {least:.3g}"
+            i, j = table.ids[k]
+            what = f"{tag}: information of edge {i} -> {j} with least eigenvalue {least:.3g}"
             right = "expected a positive definite matrix, its upper triangle"
-            raise FormatError(self.path, int(lines[k]), f"{tag}: information with {what}; {right}")
+            raise FormatError(self.path, table.lines[k], f"{what}; {right}")
         return found
 
     def _require(self, good: Any, lines: IntArray, what: str) -> None:

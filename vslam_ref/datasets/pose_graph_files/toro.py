@@ -60,8 +60,10 @@ VERTICES = {
     **dict.fromkeys(("VERTEX2", "VERTEX"), Kind("toro", "se2", PLANE, _plane)),
     "VERTEX3": Kind("toro", "se3", SPACE, _space),
 }
+ENTRIES = ("I11", "I12", "I22", "I33", "I13", "I23")
+EDGE2 = Kind("toro", "se2", PLANE, _plane, information=by_blocks, entries=ENTRIES)
 EDGES = {
-    **dict.fromkeys(("EDGE2", "EDGE", "ODOMETRY"), Kind("toro", "se2", PLANE, _plane, information=by_blocks)),
+    **dict.fromkeys(("EDGE2", "EDGE", "ODOMETRY"), EDGE2),
     "EDGE3": Kind("toro", "se3", SPACE, _space, information=upper(6)),
 }
 TAGS = {"se2": ("VERTEX2", "EDGE2"), "se3": ("VERTEX3", "EDGE3")}

@@ -11,8 +11,10 @@ module             holds
 ``errors``         the error of an edge, in two conventions, with Jacobians
 ``switching``      losses that tell false loops: switches, dynamic covariance scaling, a mixture
 ``pattern``        which blocks there are, the order of elimination, the sums
+``fronts``         which columns are eliminated together; the solution of the sparse system
 ``system``         what a descent asks: one damped step, and where it leads
 ``solver``         a graph, descended; without the edges that were found to be false
+``solution``       what may be asked of it, and what it answers
 ``starts``         poses to begin with: along the odometry, or by the chordal relaxation
 ``uncertainty``    covariances of chosen poses
 ``book``           the same algorithm in dense matrices, to be read, and to be compared with
@@ -21,7 +23,8 @@ module             holds
 
 from vslam_ref.estimation.posegraph import book, errors, spaces, starts, switching, uncertainty
 from vslam_ref.estimation.posegraph.graph import PoseGraph
-from vslam_ref.estimation.posegraph.solver import GraphSolution, Options, solve_graph
+from vslam_ref.estimation.posegraph.solution import GraphSolution, Options
+from vslam_ref.estimation.posegraph.solver import solve_graph
 from vslam_ref.estimation.posegraph.starts import chordal_start, odometry_start
 from vslam_ref.estimation.posegraph.uncertainty import marginal_covariances
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.estimation.posegraph.fronts import Fronts, make_fronts
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -32,11 +33,12 @@ ORDERINGS = ("MMD_AT_PLUS_A", "COLAMD", "bandwidth")
 
 
 class Ordering(NamedTuple):
-    """An order of elimination: nodes ``order (k,)``, its name, and ``products``, a count: the cost."""
+    """An order of elimination: nodes ``order (k,)``, its name, its fronts, and its cost, a count."""
 
     order: IntArray
     name: str
     products: float
+    fronts: Fronts
 
 
 def choose_ordering(k: int, a: IntArray, b: IntArray, names: tuple[str, ...] = ORDERINGS) -> Ordering:
@@ -64,26 +66,31 @@ def choose_ordering(k: int, a: IntArray, b: IntArray, names: tuple[str, ...] = O
     13.0
     """
     if k == 0:
-        return Ordering(np.zeros(0, dtype=np.int64), names[0], 0.0)
+        none = np.zeros(0, dtype=np.int64)
+        return Ordering(none, names[0], 0.0, Fronts(none, none, none, none))
     adjacency = _adjacency(k, a, b)
-    found = [_eliminated(adjacency, name) for name in names]
-    return min(found, key=lambda one: one.products)
+    order, name, L, products = min((_eliminated(adjacency, name) for name in names), key=lambda one: one[-1])
+    post, fronts = make_fronts(L.indptr, L.indices)
+    return Ordering(order[post], name, products, fronts)
 
 
 def _adjacency(k: int, a: IntArray, b: IntArray) -> csc_array:
-    """Symmetric matrix with the pattern of the blocks, positive definite, so that no pivot is ever moved."""
+    """Symmetric matrix with the pattern of the blocks, positive definite, so that no pivot is ever moved.
+
+    It is barely so: along a long chain the entries of its factor would else underflow, and be missing.
+    """
     from scipy.sparse import coo_array
 
     m = len(a)
     rows = np.concatenate([a, b, np.arange(k)])
     columns = np.concatenate([b, a, np.arange(k)])
     degree = np.bincount(a, minlength=k) + np.bincount(b, minlength=k)
-    values = np.concatenate([np.full(2 * m, -1.0), degree + 1.0])
+    values = np.concatenate([np.full(2 * m, -1.0), degree + 1.0 / k])
     return coo_array((values, (rows, columns)), shape=(k, k)).tocsc()
 
 
-def _eliminated(adjacency: csc_array, name: str) -> Ordering:
-    """Order the nodes by one rule, and count the products of the factor."""
+def _eliminated(adjacency: csc_array, name: str) -> tuple[IntArray, str, csc_array, float]:
+    """Order the nodes by one rule; the factor, and how many products it takes."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
     from scipy.sparse.linalg import splu
 
@@ -95,7 +102,7 @@ def _eliminated(adjacency: csc_array, name: str) -> Ordering:
         factor = splu(adjacency, name, 0.0, options=options)
         order = np.argsort(factor.perm_c)  # perm_c tells where a column went: a position, not an order
     lengths = np.diff(factor.L.indptr).astype(np.float64)
-    return Ordering(order.astype(np.int64), name, float(lengths @ lengths))
+    return order.astype(np.int64), name, factor.L, float(lengths @ lengths)
 
 
 @dataclass(frozen=True)

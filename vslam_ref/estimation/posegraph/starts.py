@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from vslam_ref.arrays import Array, IntArray, times
+from vslam_ref.estimation.posegraph.fronts import factorised
 from vslam_ref.estimation.posegraph.graph import PoseGraph, parts
 from vslam_ref.estimation.posegraph.pattern import Ordering, make_pattern
 from vslam_ref.estimation.posegraph.spaces import (
@@ -28,7 +29,6 @@ from vslam_ref.estimation.posegraph.spaces import (
     scales,
     translations,
 )
-from vslam_ref.estimation.posegraph.system import factorised
 from vslam_ref.geometry import so2, so3
 
 

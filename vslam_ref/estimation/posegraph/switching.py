@@ -20,6 +20,7 @@ tells, or means nothing; k is where the second is more likely.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -147,11 +148,14 @@ class EdgeLoss(NamedTuple):
         chi² above which an edge is false; 0: none is.
     usual : bool
         Whether the constant is the usual one, which the solver may widen.
+    rival : Loss, optional
+        Another loss that tells false edges; where it leads, a second descent begins.
     """
 
     loss: Loss
     limit: float = 0.0
     usual: bool = False
+    rival: Loss | None = None
 
     def widened(self, limit: float) -> EdgeLoss:
         """Return the same loss with another limit.
@@ -187,7 +191,7 @@ def edge_loss(name: str, space: Space, constant: float | None = None) -> EdgeLos
     Examples
     --------
     >>> edge_loss("dcs", "se2")
-    EdgeLoss(loss=DynamicCovariance(c=2.0), limit=12.0, usual=True)
+    EdgeLoss(loss=DynamicCovariance(c=2.0), limit=12.0, usual=True, rival=Switchable(c=2.0))
     """
     kinds: dict[str, tuple[type[Loss], float]] = {
         "l2": (L2, 0.0),
@@ -198,10 +202,17 @@ def edge_loss(name: str, space: Space, constant: float | None = None) -> EdgeLos
         "dcs": (DynamicCovariance, 3.0),
         "max-mixture": (MaxMixture, 1.0 / (1.0 - NULL)),
     }
+    rivals: dict[str, Callable[[float], Loss]] = {
+        "geman-mcclure": DynamicCovariance,
+        "switchable": DynamicCovariance,
+        "dcs": Switchable,
+        "max-mixture": lambda c: DynamicCovariance(0.5 * c),  # of the usual k nearly the usual Phi
+    }
     if name not in kinds:
         raise ValueError(f"unknown loss {name!r}; known: {', '.join(NAMES)}")
     usual = {"geman-mcclure": SWITCH**0.5, "max-mixture": LIKELY[space] ** 0.5}
     kind, times = kinds[name]
     c = usual.get(name) if constant is None else constant
     loss = kind() if c is None or name == "l2" else kind(c)
-    return EdgeLoss(loss, times * loss.c**2 if times else 0.0, constant is None)
+    rival = rivals[name](loss.c) if name in rivals else None
+    return EdgeLoss(loss, times * loss.c**2 if times else 0.0, constant is None, rival)

@@ -17,6 +17,7 @@ import numpy as np
 from vslam_ref.arrays import Array, BoolArray, times
 from vslam_ref.estimation.least_squares import Step
 from vslam_ref.estimation.posegraph.errors import Convention, edge_error, edge_error_with_jacobians
+from vslam_ref.estimation.posegraph.fronts import solve_in_order
 from vslam_ref.estimation.posegraph.graph import PoseGraph, parts
 from vslam_ref.estimation.posegraph.pattern import Pattern, make_pattern
 from vslam_ref.estimation.posegraph.spaces import moved, tangent_size, translations
@@ -24,7 +25,6 @@ from vslam_ref.estimation.robust import L2, Loss
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
-    from scipy.sparse.linalg import SuperLU
 
 DAMPED = (1e-6, 1e32)
 """Bounds of the squared column lengths that the damping multiplies."""
@@ -133,11 +133,10 @@ class GraphProblem:
 
     def __post_init__(self) -> None:
         given: object = self.judged
-        n, m = self.graph.sizes
+        m = self.graph.sizes[1]
         self.judged = np.ones(m, dtype=np.bool_) if given is None else np.asarray(self.judged, dtype=np.bool_)
         self.roots = np.swapaxes(np.linalg.cholesky(self.graph.information), -1, -2)
         self._layout: tuple[Pattern, BoolArray] | None = None
-        self._parts = int(parts(n, self.graph.tail, self.graph.head).max(initial=-1))
 
     @property
     def floor(self) -> float:
@@ -182,13 +181,18 @@ class GraphProblem:
         """Pattern of the edges with a weight that matters, and which these are: the last one if it fits."""
         graph, matters = self.graph, weights >= self.negligible
         n, _ = graph.sizes
-        if int(parts(n, graph.tail[matters], graph.head[matters]).max(initial=-1)) != self._parts:
+        if not matters.all() and self._count(matters) != self._count(matters | True):
             matters = np.ones_like(matters)  # an edge that holds the graph together always matters
         if self._layout is None or (matters != self._layout[1]).any():
             d = tangent_size(graph.space)
             found = make_pattern(n, graph.tail[matters], graph.head[matters], graph.fixed, d)
             self._layout = found, matters
         return self._layout
+
+    def _count(self, some: BoolArray) -> int:
+        """Parts of the graph with some of its edges, less 1."""
+        graph = self.graph
+        return int(parts(graph.sizes[0], graph.tail[some], graph.head[some]).max(initial=-1))
 
     def linearise(self, place: GraphPlace, before: GraphModel | None = None) -> GraphModel | None:
         """Take a place; None where an error is not finite."""
@@ -198,12 +202,10 @@ class GraphProblem:
         """Damped step on the right of every pose; None where the system is singular."""
         diagonal = here.diagonal
         metric = np.where(diagonal > 0, np.clip(diagonal, *DAMPED), 1.0)
-        matrix = here.matrix.copy()
-        matrix.data[here.pattern.diagonal] += damping * metric
-        factor = factorised(matrix)
-        if factor is None:
-            return None
-        step = -factor.solve(here.gradient)
+        matrix, damped = here.matrix, here.matrix.data.copy()
+        damped[here.pattern.diagonal] += damping * metric
+        fronts = here.pattern.ordering.fronts
+        step = -solve_in_order(damped, matrix.indices, matrix.indptr, fronts, here.gradient)
         square, slope = float(metric @ step**2), float(here.gradient @ step)
         if not (np.isfinite(step).all() and slope <= 0.0):
             return None
@@ -217,13 +219,3 @@ class GraphProblem:
     def costs(self, place: GraphPlace) -> Array:
         """Cost of each edge, (m,)."""
         return place.costs
-
-
-def factorised(matrix: csc_array) -> SuperLU | None:
-    """Factor a symmetric positive definite matrix in the order in which it stands; None if it is singular."""
-    from scipy.sparse.linalg import splu
-
-    try:
-        return splu(matrix, "NATURAL", 0.0, options={"SymmetricMode": True})
-    except RuntimeError:
-        return None

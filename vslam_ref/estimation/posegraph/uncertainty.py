@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
 from vslam_ref.estimation.posegraph.errors import Convention
+from vslam_ref.estimation.posegraph.fronts import factorised
 from vslam_ref.estimation.posegraph.graph import PoseGraph
 from vslam_ref.estimation.posegraph.spaces import tangent_size
-from vslam_ref.estimation.posegraph.system import GraphModel, GraphProblem, factorised
+from vslam_ref.estimation.posegraph.system import GraphModel, GraphProblem
 
 BATCH = 64
 """Nodes that are solved for at a time."""
