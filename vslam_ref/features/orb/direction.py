@@ -60,7 +60,7 @@ def _moments(flat: Bytes, width: int, xy: Pixels) -> IntArray:
 
 
 def towards(moment: IntArray) -> Array:
-    """Normalised directions (n, 2) of moments (n, 2); (1, 0) where a patch has no direction.
+    """Directions (n, 2), normalised, of moments (n, 2); (1, 0) where a patch has no direction.
 
     Implements :eq:`eq-orb-angle`.
 

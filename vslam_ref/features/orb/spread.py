@@ -94,9 +94,9 @@ def _split(nodes: Nodes, xy: Pixels, wanted: int) -> Nodes:
     done = np.zeros(len(inside), np.bool_)
     done[fullest[: np.searchsorted(more, wanted - len(inside)) + 1]] = True
     child = np.where(done[nodes.of], quarter, 0)
-    step = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+    step: IntArray = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
     corner = nodes.corner[:, None] + step * half[:, None]
-    size: IntArray = np.where(step, (nodes.size - half)[:, None], half[:, None])
+    size = np.where(step, (nodes.size - half)[:, None], half[:, None])
     size = np.where(done[:, None, None], size, nodes.size[:, None])
     return _without_empty(Nodes(4 * nodes.of + child, corner.reshape(-1, 2), size.reshape(-1, 2)))
 
