@@ -18,8 +18,8 @@ pytestmark = pytest.mark.usefixtures("backend")
 def test_a_slope_keeps_its_place(scale: float) -> None:
     """Each octave of 5 x + 4 y has that grey level at its pixels' places in the first.
 
-    A rounding is off by half a level at most, once in each octave, and weights by 2^-12.  Half a pixel that is
-    forgotten, 0.1 pixels in each direction and octave at scale 1.2, is 0.9 levels.
+    A rounding is off by half a level at most, once in each octave, and weights by 2^-12.  Half a pixel that
+    is forgotten, 0.1 pixels in each direction and octave at scale 1.2, is 0.9 levels.
     """
     x, y = np.meshgrid(np.arange(30), np.arange(25))
     images = octave_images((5 * x + 4 * y).astype(np.uint8), 5, scale)
