@@ -1,9 +1,9 @@
 """A building that makes place recognition err: one door everywhere, few posters hung again and again.
 
-The corridors are those of ``building``, but each of its four sides has an order of its own.  What is different
-from place to place is the order of the things, faint plaster, and posters that are nowhere else; what is the
-same is every door, floor, ceiling, and every poster that is hung twice.  The walk goes round twice, on the
-second round beside the first one.
+The corridors are those of ``building``, but each of its four sides has an order of its own.  What differs from
+place to place is this order, the flecks of plaster, floor and ceiling, and posters that are nowhere else; what
+is the same is every door, the joints of floor and ceiling, and every poster that is hung twice.  The walk goes
+round twice, on the second round beside the first one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.worlds.rendered import building, motion, painting
-from vslam_ref.worlds.rendered.corridor import HEIGHT, WIDTH
+from vslam_ref.worlds.rendered.corridor import HEIGHT, WIDTH, add_level
 from vslam_ref.worlds.rendered.desk import Builder
 from vslam_ref.worlds.rendered.quads import joined, quad
 from vslam_ref.worlds.rendered.record import EXACT, Effects, RenderedScene
@@ -42,7 +42,7 @@ class Repeats(NamedTuple):
     """
 
     doors: float = 0.4
-    again: float = 0.3
+    again: float = 0.2
     posters: int = 6
 
 
@@ -96,20 +96,14 @@ def lookalikes(
 
 
 class _Stock(NamedTuple):
-    """Textures that are used again: the door, posters with their sizes, floor, ceiling."""
+    """Textures that are used again: the door, and posters with their sizes, metres."""
 
     door: int
     posters: list[tuple[int, float, float]]
-    floor: int
-    ceiling: int
 
 
 def _build(b: Builder, repeats: Repeats) -> None:
-    floor = b.texture(lambda r, s: painting.tiles(r, s, 50), 4.0, WIDTH, 0.008)
-    ceiling = b.texture(lambda r, s: painting.tiles(r, s, 60, 190.0), 4.0, WIDTH, 0.012)
-    stock = _Stock(
-        b.texture(painting.door, *DOOR, 0.004), [_poster(b) for _ in range(repeats.posters)], floor, ceiling
-    )
+    stock = _Stock(b.texture(painting.door, *DOOR, 0.004), [_poster(b) for _ in range(repeats.posters)])
     middle = building.OUTER / 2
     for k in range(4):
         c, s = round(np.cos(k * np.pi / 2)), round(np.sin(k * np.pi / 2))
@@ -117,7 +111,7 @@ def _build(b: Builder, repeats: Repeats) -> None:
         first = len(b.parts)
         _wall(b, np.zeros(3), building.OUTER, 1.0, stock, repeats)
         _wall(b, np.array([WIDTH, WIDTH, 0.0]), building.OUTER - 2 * WIDTH, -1.0, stock, repeats)
-        _levels(b, stock)
+        add_level(b, [0.0, 0.0], [building.SIDE, WIDTH])
         for i in range(first, len(b.parts)):
             part = b.parts[i]
             centre = np.array([middle, middle, 0.0])
@@ -153,17 +147,6 @@ def _thing(b: Builder, stock: _Stock, repeats: Repeats) -> tuple[float, tuple[in
     if b.rng.random() < repeats.again:
         return low, stock.posters[int(b.rng.integers(len(stock.posters)))]
     return low, _poster(b)
-
-
-def _levels(b: Builder, stock: _Stock) -> None:
-    """Floor and ceiling of one side, the same panel again and again."""
-    at = 0.0
-    while at < building.SIDE - 1e-9:
-        part = min(4.0, building.SIDE - at)
-        x, y = np.array([part, 0, 0]), np.array([0, WIDTH, 0])
-        b.parts.append(quad([at, WIDTH, 0.0], x, -y, stock.floor, 0.8))
-        b.parts.append(quad([at, 0.0, HEIGHT], x, y, stock.ceiling))
-        at += part
 
 
 def overlap(scene: RenderedScene, grid: tuple[int, int] = (8, 6)) -> Array:
