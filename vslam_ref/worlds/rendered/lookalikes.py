@@ -19,7 +19,7 @@ from vslam_ref.worlds.rendered.desk import Builder
 from vslam_ref.worlds.rendered.quads import joined, quad
 from vslam_ref.worlds.rendered.record import EXACT, Effects, RenderedScene
 from vslam_ref.worlds.rendered.scenes import pinhole
-from vslam_ref.worlds.rendered.textures import pack
+from vslam_ref.worlds.rendered.textures import Bytes, pack
 
 Rng = np.random.Generator
 LAP = 4 * (building.SIDE - 2 * building.RADIUS + building.RADIUS * np.pi / 2) / building.SPEED
@@ -35,14 +35,17 @@ class Repeats(NamedTuple):
     ----------
     doors : float
         Share of the things on the walls that are the one door.
+    numbered : bool
+        Whether each door has a sign of its own; else all have one.
     again : float
         Share of the posters that hang in several places.
     posters : int
         How many different ones these are.
     """
 
-    doors: float = 0.4
-    again: float = 0.2
+    doors: float = 0.5
+    numbered: bool = True
+    again: float = 0.1
     posters: int = 6
 
 
@@ -142,11 +145,24 @@ def _wall(b: Builder, start: Array, length: float, inwards: float, stock: _Stock
 def _thing(b: Builder, stock: _Stock, repeats: Repeats) -> tuple[float, tuple[int, float, float]]:
     """What hangs next, and how high, metres."""
     if b.rng.random() < repeats.doors:
-        return 0.0, (stock.door, *DOOR)
+        if not repeats.numbered:
+            return 0.0, (stock.door, *DOOR)
+        b.images.append(numbered(b.images[stock.door], b.rng))
+        return 0.0, (len(b.images) - 1, *DOOR)
     low = float(b.rng.uniform(1.0, 1.35))
     if b.rng.random() < repeats.again:
         return low, stock.posters[int(b.rng.integers(len(stock.posters)))]
     return low, _poster(b)
+
+
+def numbered(door: Bytes, rng: Rng) -> Bytes:
+    """The same door (H, W) with another sign, where ``painting.door`` has it; grey values, no unit."""
+    height, width = door.shape
+    rows, columns = slice(height // 5, height // 5 + height // 12), slice(int(0.3 * width), int(0.7 * width))
+    other = painting.door(rng, door.shape)
+    made = door.copy()
+    made[rows, columns] = other[rows, columns]
+    return made
 
 
 def overlap(scene: RenderedScene, grid: tuple[int, int] = (8, 6)) -> Array:
