@@ -1,8 +1,8 @@
 """YAML of DBoW2 and DBoW3: a header, a list of nodes, and a list that gives each word its node.
 
 The lists have ten thousands of entries of one shape, which are read entry by entry, not as YAML: so a file of
-a million words takes seconds, and nothing in it can be constructed.  DBoW3 writes the type of the descriptor's
-elements and their number before them, "0 32".
+a million words takes seconds, and nothing in it can be constructed.  DBoW3 writes the type of the
+descriptor's elements and their number before them, "0 32".
 """
 
 from __future__ import annotations

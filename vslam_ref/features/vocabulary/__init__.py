@@ -11,9 +11,9 @@ module         holds
 ``book``       one level trained, one descent, one bag, one score in plain loops
 =============  ==================================================================================
 
-A descriptor is 32 bytes, 256 bits, and the distance of two is the number of bits that differ.  The definitions
-are those of DBoW2, so that its vocabularies give the same words, weights and scores here; where two children
-are equally near, the first one wins.  A picture without a word scores 0 with every picture.
+A descriptor is 32 bytes, 256 bits, and the distance of two is the number of bits that differ.  The
+definitions are those of DBoW2, so that its vocabularies give the same words, weights and scores here; where
+two children are equally near, the first one wins.  A picture without a word scores 0 with every picture.
 """
 
 from vslam_ref.features.vocabulary.bags import Bag, bag, score

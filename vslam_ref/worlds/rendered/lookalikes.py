@@ -1,9 +1,9 @@
 """A building that makes place recognition err: one door everywhere, few posters hung again and again.
 
-The corridors are those of ``building``, but each of its four sides has an order of its own.  What differs from
-place to place is this order, the flecks of plaster, floor and ceiling, and posters that are nowhere else; what
-is the same is every door, the joints of floor and ceiling, and every poster that is hung twice.  The walk goes
-round twice, on the second round beside the first one.
+The corridors are those of ``building``, but each of its four sides has an order of its own.  What differs
+from place to place is this order, the flecks of plaster, floor and ceiling, and posters that are nowhere
+else; what is the same is every door, the joints of floor and ceiling, and every poster that is hung twice.
+The walk goes round twice, on the second round beside the first one.
 """
 
 from __future__ import annotations
@@ -95,7 +95,9 @@ def lookalikes(
     path = motion.held(building.path(way), sway)
     times = 2 * LAP * np.arange(pictures) / pictures
     lens = pinhole("building", size)
-    return RenderedScene("lookalikes", joined(b.parts), pack(b.images), lens, size, path, times, effects, seed)
+    return RenderedScene(
+        "lookalikes", joined(b.parts), pack(b.images), lens, size, path, times, effects, seed
+    )
 
 
 class _Stock(NamedTuple):
@@ -138,7 +140,9 @@ def _wall(b: Builder, start: Array, length: float, inwards: float, stock: _Stock
         low, (image, wide, tall) = _thing(b, stock, repeats)
         if x + wide > length - 0.1:
             break
-        b.parts.append(quad(foot + before + x * right + [0, 0, low + tall], wide * right, [0, 0, -tall], image))
+        b.parts.append(
+            quad(foot + before + x * right + [0, 0, low + tall], wide * right, [0, 0, -tall], image)
+        )
         x += wide + float(b.rng.uniform(0.3, 1.2))
 
 
@@ -166,7 +170,7 @@ def numbered(door: Bytes, rng: Rng) -> Bytes:
 
 
 def overlap(scene: RenderedScene, grid: tuple[int, int] = (8, 6)) -> Array:
-    """Share (K, K) of what picture k shows that picture j shows, too, from points of a grid (W, H); a ratio."""
+    """Share (K, K) of a grid (W, H) of points of picture k that picture j shows, too; a ratio."""
     u, v = ((np.arange(n) + 0.5) / n * size - 0.5 for n, size in zip(grid, scene.size, strict=True))
     uv = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
     X = np.concatenate([scene.surface(k, uv) for k in range(len(scene))])
