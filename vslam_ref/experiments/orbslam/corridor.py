@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from vslam_ref.arrays import BoolArray
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.pictures import read_grey

@@ -1,8 +1,8 @@
-"""Recognition of places: a real corridor walked twice, rendered look-alikes, and vocabularies of four sizes.
+"""Recognition of places: a real corridor walked twice, rendered look-alikes, four vocabularies.
 
-Each picture is compared with those before.  Right is a candidate that shows the same place: in the corridor by
-its marked pairs, in the look-alikes by the scene points that both pictures show.  Wrong is any other in the
-corridor, and in the look-alikes one without a common scene point.
+Each picture is compared with those before.  Right is a candidate that shows the same place: in the corridor
+by its marked pairs, in the look-alikes by the scene points that both pictures show.  Wrong is any other in
+the corridor, and in the look-alikes one without a common scene point.
 
 The thresholds of recognition were chosen on look-alikes of other seeds, and fixed before the corridor's
 pictures were opened; the vocabularies are trained on other pictures.
@@ -37,7 +37,7 @@ ASKED = 37
 """Revisits of 44 that are found by matching all pictures with 800 SIFT features, none wrong."""
 GAIN = 2
 """Revisits that ten times the words may bring before fewer are called too few."""
-SOURCE = "A§3.1, recognition of places"
+SOURCE = "A§3.1"
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,8 @@ def corridor_claim(walked: Walked) -> Claim:
         "corridor-is-recognised",
         SOURCE,
         "Places that were seen before are recognised, and no others",
-        f"in the corridor at least {ASKED} of its 44 revisits are accepted with a marked partner, and no picture "
-        "with another one",
+        f"in the corridor at least {ASKED} of its 44 revisits are accepted with a marked partner, and no "
+        "picture with another one",
         found >= ASKED and wrong == 0,
         f"In the corridor {found} of {walked.revisits} revisits are recognised and {wrong} pictures wrongly",
         {"found": found, "wrong": wrong, "revisits": walked.revisits},
@@ -173,10 +173,11 @@ def lookalikes_claim(data: RecognitionRuns) -> Claim:
         "lookalikes-are-told-apart",
         SOURCE,
         "Places that only look alike are told apart by the geometry of many parts of the picture",
-        "in every building: no accepted pair without a common scene point, and at least 90 % of the revisits found",
+        "in every building: no accepted pair without a common scene point, and at least 90 % of the revisits "
+        "found",
         bool(good.all()),
         f"In {len(wrong)} buildings {int(wrong.sum())} wrong places are accepted; of the revisits "
-        f"{found.min():.0%} or more are found in each",
+        f"at least {found.min():.0%} are found in each",
         {"wrong": wrong.tolist(), "found": found.round(3).tolist()},
         share=float(good.mean()),
     )
@@ -218,11 +219,11 @@ def words_claim(walked: Walked) -> Claim:
         "geometry-finds-more-than-words",
         SOURCE,
         "Words propose places; it takes geometry to accept them",
-        "in the corridor, with thresholds that let no wrong one pass: fewer revisits by the score alone, at its "
-        "best threshold, than recognised with geometry at the fixed one, none of these wrong",
+        "in the corridor, with thresholds that let no wrong one pass: fewer revisits by the score alone, at "
+        "its best threshold, than recognised with geometry at the fixed one, none of these wrong",
         alone < checked and wrong == 0,
-        f"By their scores alone {alone} revisits of {walked.revisits} lie above the first wrong picture; with "
-        f"geometry {checked} are recognised, {wrong} wrongly",
+        f"By their scores alone {alone} revisits of {walked.revisits} lie above the first wrong picture; "
+        f"with geometry {checked} are recognised, {wrong} wrongly",
         {"alone": alone, "checked": checked, "wrong": wrong},
     )
 
@@ -235,8 +236,8 @@ def enough_claim(walked: Walked) -> Claim:
         "ten-thousand-words-are-enough",
         SOURCE,
         "A vocabulary of ten thousand words puts the right picture first as often as one of more words",
-        f"in the corridor: right first in no fewer revisits than with a thousand, and in at most {GAIN} fewer "
-        "than with the largest vocabulary",
+        f"in the corridor: right first in no fewer revisits than with a thousand, and in at most {GAIN} "
+        "fewer than with the largest vocabulary",
         own >= fewer and own >= more - GAIN,
         f"With {walked.sizes[SHIPPED]} words the right picture has the highest score in {own} revisits, with "
         f"{walked.sizes[0]} words in {fewer}, with {walked.sizes[-1]} in {more}",
