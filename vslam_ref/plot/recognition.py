@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from vslam_ref.arrays import Array, IntArray
@@ -41,7 +40,8 @@ def recognition_figure(
             left.plot(squares[1], squares[0], "-", color=colour, label=f"{size} words, geometry")
         left.set(xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.03), title="the corridor")
         left.legend(loc="lower left")
-        bins = np.arange(0, max(right.max(initial=1), wrong.max(initial=1), sure) + 4, 3)
+        most = max(int(right.max(initial=1)), int(wrong.max(initial=1)), sure)
+        bins = [float(k) for k in range(0, most + 4, 3)]
         middle.hist(wrong, bins, color=style.VERMILION, alpha=0.7, label="another place")
         middle.hist(right, bins, color=style.BLUE, alpha=0.7, label="the same place")
         middle.axvline(sure, color=style.BLACK, lw=0.9, label="enough alone")

@@ -80,13 +80,13 @@ def descend(root: Node, descriptor: Bits) -> int:
 
 
 def idf(pictures: list[list[int]], word: int) -> float:
-    """How much a word says: log of all pictures over those that have it, 0 if none has."""
+    """How much a word says, no unit: log of all pictures over those that have it, 0 if none has."""
     having = sum(word in words for words in pictures)
     return math.log(len(pictures) / having) if having else 0.0
 
 
 def weigh(words: list[int], weight: list[float]) -> Words:
-    """Weights of a picture's words: sum of their idf over the sum of all, without words that say nothing."""
+    """Weights of a picture's words, no unit: sum of their idf over that of all; without those that say nothing."""
     value: Words = defaultdict(float)
     for word in words:
         if weight[word] > 0:
@@ -96,7 +96,7 @@ def weigh(words: list[int], weight: list[float]) -> Words:
 
 
 def score(a: Words, b: Words) -> float:
-    """How alike two pictures are; without a common word 0, not one half."""
+    """How alike two pictures are, a ratio; without a common word 0, not one half."""
     return sum(min(a[word], b[word]) for word in a if word in b)
 
 

@@ -126,4 +126,4 @@ def best(found: Found, most: int) -> Found:
     [5, 8]
     """
     order = np.argsort(-found.score, kind="stable")[:most]
-    return Found(*(field[order] for field in found))
+    return Found(found.entry[order], found.score[order], found.common[order])

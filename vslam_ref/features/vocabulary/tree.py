@@ -185,7 +185,7 @@ class Descended(NamedTuple):
     Attributes
     ----------
     node : ndarray of int, shape (N,)
-        The leaf of each feature.
+        The leaf of each feature; no unit.
     distance : ndarray of int, shape (N,)
         Bits in which it differs from that leaf.
     """
@@ -254,12 +254,12 @@ def _descend(features: Lanes, nodes: Lanes, first: IntArray, children: IntArray)
 
 
 def words(vocabulary: Vocabulary, descriptor: Bytes) -> IntArray:
-    """Word (N,) of each descriptor (N, 32)."""
+    """Word (N,) of each descriptor (N, 32); no unit."""
     return vocabulary.word[descend(vocabulary, descriptor).node]
 
 
 def nodes_at_level(vocabulary: Vocabulary, node: IntArray, level: int) -> IntArray:
-    """Direct index: the ancestor (N,) of each node (N,) on a level, or the node where it stands higher.
+    """Direct index: ancestor (N,), a number, of each node (N,) on a level, or the node where it stands higher.
 
     Raises
     ------
