@@ -44,16 +44,16 @@ def test_the_true_matrix_is_one_of_the_answers() -> None:
 
 
 def test_answers_are_those_of_opencv() -> None:
-    """OpenCV solves with the positions as they are given: in focal lengths, all columns are of one size."""
+    """OpenCV makes positions single precision and does not scale them: both get such ones, in focal lengths."""
     rng = np.random.default_rng(1)
     for _ in range(20):
-        a, b = ((uv - K[:2, 2]) / 420.0 for uv in views(rng, 7)[:2])
+        a, b = (((uv - K[:2, 2]) / 420).astype(np.float32).astype(float) for uv in views(rng, 7)[:2])
         theirs = cv2.findFundamentalMat(a, b, cv2.FM_7POINT)[0].reshape(-1, 3, 3)
         found = seven_point_fundamentals(a, b)
         ours = found.F[found.valid]
         assert len(ours) == len(theirs)
         for one in theirs / np.linalg.norm(theirs, axis=(1, 2), keepdims=True):
-            # samples of seven have conditions of up to 1e5, and a double root doubles the digits that are lost
+            # conditions reach 1e5, and a double root doubles the digits that are lost
             assert min(min(np.abs(one - F).max(), np.abs(one + F).max()) for F in ours) < 1e-6
 
 

@@ -86,7 +86,7 @@ def idf(pictures: list[list[int]], word: int) -> float:
 
 
 def weigh(words: list[int], weight: list[float]) -> Words:
-    """Weights of a picture's words, no unit: sum of their idf over that of all; without those that say nothing."""
+    """Weights of a picture's words, no unit: sum of their idf over that of all; without those of weight 0."""
     value: Words = defaultdict(float)
     for word in words:
         if weight[word] > 0:

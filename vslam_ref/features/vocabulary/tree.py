@@ -259,7 +259,7 @@ def words(vocabulary: Vocabulary, descriptor: Bytes) -> IntArray:
 
 
 def nodes_at_level(vocabulary: Vocabulary, node: IntArray, level: int) -> IntArray:
-    """Direct index: ancestor (N,), a number, of each node (N,) on a level, or the node where it stands higher.
+    """Direct index: the ancestor (N,) of each node (N,) on a level, itself if higher; no unit.
 
     Raises
     ------
