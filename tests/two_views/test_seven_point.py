@@ -44,7 +44,7 @@ def test_the_true_matrix_is_one_of_the_answers() -> None:
 
 
 def test_answers_are_those_of_opencv() -> None:
-    """OpenCV makes positions single precision and does not scale them: both get such ones, in focal lengths."""
+    """OpenCV makes positions single precision, unscaled: both get such ones, in focal lengths."""
     rng = np.random.default_rng(1)
     for _ in range(20):
         a, b = (((uv - K[:2, 2]) / 420).astype(np.float32).astype(float) for uv in views(rng, 7)[:2])

@@ -20,8 +20,8 @@ def drawn(seed: int, n: int) -> np.ndarray:
     return np.repeat(rng.integers(0, 256, (n, 4), dtype=np.uint8), 8, 1)
 
 
-def nested(v: vocabulary.Vocabulary) -> book.Node:
-    nodes = [book.Node(tuple(b)) for b in np.unpackbits(v.descriptor, axis=1).tolist()]
+def nested(v: vocabulary.Vocabulary) -> book.TreeNode:
+    nodes = [book.TreeNode(tuple(b)) for b in np.unpackbits(v.descriptor, axis=1).tolist()]
     for k, node in enumerate(nodes):
         first = int(v.first[k])
         node.children, node.word = nodes[first : first + int(v.children[k])], int(v.word[k])

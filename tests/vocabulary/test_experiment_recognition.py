@@ -10,13 +10,13 @@ import pytest
 from vslam_ref.datasets import catalogue
 from vslam_ref.experiments.framework import Study, load
 from vslam_ref.experiments.orbslam import corridor, lookalikes, recognition
-from vslam_ref.experiments.orbslam.lookalikes import Seen
+from vslam_ref.experiments.orbslam.lookalikes import SeenPictures
 from vslam_ref.support.errors import InputError
 
 K, REVISITS = 84, 44
 
 
-def walk_of(found: int, wrong: int = 0, alone: int = 30) -> Seen:
+def walk_of(found: int, wrong: int = 0, alone: int = 30) -> SeenPictures:
     """Of 84 pictures the last 44 are revisits; some are accepted, some wrongly, ``alone`` by their score."""
     rows = np.arange(K)
     revisit = rows >= K - REVISITS
@@ -25,7 +25,7 @@ def walk_of(found: int, wrong: int = 0, alone: int = 30) -> Seen:
     accepted |= rows < wrong
     score = np.where(rows < K - REVISITS, 0.3, 0.2)
     score[K - REVISITS : K - REVISITS + alone] = 0.5
-    return Seen(np.full(K, 3), np.where(right, 40, 9), accepted, right, ~right, np.full(K, 3), score)
+    return SeenPictures(np.full(K, 3), np.where(right, 40, 9), accepted, right, ~right, np.full(K, 3), score)
 
 
 def drawn(
@@ -99,7 +99,7 @@ def test_precision_and_recall_end_with_all_pictures() -> None:
 def test_the_rule_of_the_thresholds() -> None:
     """A tenth above the wrong candidates' most, rounded up; agreement needs neighbours, in time and place."""
     flags = np.zeros(5, np.bool_)
-    seen = Seen(
+    seen = SeenPictures(
         np.array([1, 2, 40, 41, 7]),
         np.array([99, 18, 19, 30, 29]),
         flags,
@@ -114,7 +114,7 @@ def test_the_rule_of_the_thresholds() -> None:
     assert lookalikes.choose([few, seen], 3) == (33, 21)
 
 
-def replace_squares(seen: Seen, squares: int) -> Seen:
+def replace_squares(seen: SeenPictures, squares: int) -> SeenPictures:
     return seen._replace(squares=np.full(5, squares))
 
 

@@ -45,7 +45,7 @@ COMMAND = "python -m vslam_ref.experiments.orb.words"
 Bytes = NDArray[np.uint8]
 
 
-class Source(NamedTuple):
+class PictureSource(NamedTuple):
     """Pictures of one kind: what they are, their licence, and their grey values, each (H, W)."""
 
     name: str
@@ -53,7 +53,7 @@ class Source(NamedTuple):
     pictures: list[Bytes]
 
 
-def sources() -> Iterator[Source]:
+def sources() -> Iterator[PictureSource]:
     """Yield the pictures, rendered ones first.
 
     Raises
@@ -64,20 +64,20 @@ def sources() -> Iterator[Source]:
     for name in SCENES:
         made = [scene(name, seed) for seed in SCENE_SEEDS]
         shown = [one.frame(k * len(one) // PER_SCENE) for one in made for k in range(PER_SCENE)]
-        yield Source(f"rendered {name}, seeds {' and '.join(map(str, SCENE_SEEDS))}", "MIT", shown)
+        yield PictureSource(f"rendered {name}, seeds {' and '.join(map(str, SCENE_SEEDS))}", "MIT", shown)
     for name, (licence, patterns) in SETS.items():
         folder = catalogue.require(name)
         paths = [path for pattern in patterns.split() for path in sorted(folder.glob(pattern))]
-        yield Source(name, licence, [read_grey(path) for path in paths])
+        yield PictureSource(name, licence, [read_grey(path) for path in paths])
 
 
-def trained(given: list[Source], *, branching: int = BRANCHING, levels: int = LEVELS) -> Vocabulary:
+def trained(given: list[PictureSource], *, branching: int = BRANCHING, levels: int = LEVELS) -> Vocabulary:
     """Train a vocabulary on pictures, with the seed of the one that is shipped."""
     described = [extract(image, FEATURES).descriptor for source in given for image in source.pictures]
     return train(described, np.random.default_rng(SEED), branching=branching, levels=levels)
 
 
-def provenance(given: list[Source], made: Vocabulary, content: bytes) -> dict[str, Any]:
+def provenance(given: list[PictureSource], made: Vocabulary, content: bytes) -> dict[str, Any]:
     """What the vocabulary was made of."""
     digest = hashlib.sha256()
     for source in given:

@@ -8,7 +8,7 @@ from vslam_ref.arrays import BoolArray
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.pictures import read_grey
 from vslam_ref.datasets.text import FormatError
-from vslam_ref.experiments.orbslam.lookalikes import Features, features
+from vslam_ref.experiments.orbslam.lookalikes import PictureFeatures, features
 
 NAME = "rtabmap_loop_samples"
 FIRST_ROUND = 40
@@ -18,7 +18,7 @@ FIRST_ROUND = 40
 class Corridor(NamedTuple):
     """Features of the pictures in the order of time, and pairs (K, K) of a picture and an earlier one."""
 
-    given: list[Features]
+    given: list[PictureFeatures]
     same: BoolArray
 
 

@@ -34,7 +34,7 @@ SEEN = 0.2
 Bytes = NDArray[np.uint8]
 
 
-class Seen(NamedTuple):
+class SeenPictures(NamedTuple):
     """Pictures one after the other, what was best in each, and whether it was right.
 
     Attributes
@@ -61,7 +61,7 @@ class Seen(NamedTuple):
     score: Array
 
 
-class Features(NamedTuple):
+class PictureFeatures(NamedTuple):
     """Of a picture: pixels (N, 2), angles (N,), radians, and descriptors (N, 32)."""
 
     uv: Array
@@ -69,10 +69,10 @@ class Features(NamedTuple):
     descriptor: Bytes
 
 
-def features(image: Bytes) -> Features:
+def features(image: Bytes) -> PictureFeatures:
     """Features of a picture (H, W)."""
     found = extract(image, FEATURES)
-    return Features(found.uv, found.angle, found.descriptor)
+    return PictureFeatures(found.uv, found.angle, found.descriptor)
 
 
 def world(seed: int, pictures: int = 90) -> RenderedScene:
@@ -81,7 +81,7 @@ def world(seed: int, pictures: int = 90) -> RenderedScene:
 
 
 def recognised(
-    given: list[Features], vocabulary: Vocabulary, settings: RecognitionSettings, seed: int
+    given: list[PictureFeatures], vocabulary: Vocabulary, settings: RecognitionSettings, seed: int
 ) -> tuple[list[Recognition], IntArray, Array]:
     """Recognise pictures in their order; with them the first by score of each, and its score."""
     recogniser = Recogniser(vocabulary, np.random.default_rng(seed), settings)
@@ -98,12 +98,12 @@ def recognised(
 
 def judged_by(
     recognitions: tuple[list[Recognition], IntArray, Array], right: BoolArray, wrong: BoolArray
-) -> Seen:
+) -> SeenPictures:
     """What was recognised, beside the truth: ``right`` and ``wrong`` (K, K), picture and candidate."""
     found, first, score = recognitions
     entry = np.array([one.best.entry for one in found])
     rows, there = np.arange(len(found)), entry >= 0
-    return Seen(
+    return SeenPictures(
         entry,
         np.array([one.best.squares for one in found]),
         np.array([one.entry >= 0 for one in found]),
@@ -120,13 +120,13 @@ def truth(shared: Array) -> tuple[BoolArray, BoolArray]:
     return most >= SEEN, most == 0.0
 
 
-def choose(worlds: list[Seen], near: int) -> tuple[int, int]:
+def choose(worlds: list[SeenPictures], near: int) -> tuple[int, int]:
     """The two thresholds, by the rule above, from the best candidates of worlds.
 
     Examples
     --------
     >>> none, good = np.zeros(4, bool), np.array([True, False, False, True])
-    >>> one = Seen(np.array([5, 9, 10, 5]), np.array([60, 12, 19, 50]), none, good, ~good, none, none)
+    >>> one = SeenPictures(np.array([5, 9, 10, 5]), np.array([60, 12, 19, 50]), none, good, ~good, none, none)
     >>> choose([one], 3)
     (21, 14)
     """

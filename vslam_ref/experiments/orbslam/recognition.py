@@ -21,7 +21,14 @@ from vslam_ref.datasets import catalogue
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
 from vslam_ref.experiments.orb import words
 from vslam_ref.experiments.orbslam import corridor
-from vslam_ref.experiments.orbslam.lookalikes import Seen, features, judged_by, recognised, truth, world
+from vslam_ref.experiments.orbslam.lookalikes import (
+    SeenPictures,
+    features,
+    judged_by,
+    recognised,
+    truth,
+    world,
+)
 from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.support.config import assume
 from vslam_ref.systems.orbslam.recognition import RecognitionSettings
@@ -86,14 +93,14 @@ class Walked(NamedTuple):
     ----------
     sizes : list of int
         Words of each vocabulary.
-    seen : list of Seen
+    seen : list of SeenPictures
     right_first : list of ndarray of bool, shape (pictures,)
         Pictures whose highest score is that of a right one, with each vocabulary.
     revisits : int
     """
 
     sizes: list[int]
-    seen: list[Seen]
+    seen: list[SeenPictures]
     right_first: list[BoolArray]
     revisits: int
 
@@ -105,7 +112,7 @@ def vocabulary(branching: int, levels: int) -> Vocabulary:
 
 
 @cache
-def _pictures() -> list[words.Source]:
+def _pictures() -> list[words.PictureSource]:
     return list(words.sources())
 
 

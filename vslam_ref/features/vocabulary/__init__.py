@@ -17,7 +17,7 @@ two children are equally near, the first one wins.  A picture without a word sco
 """
 
 from vslam_ref.features.vocabulary.bags import Bag, bag, score
-from vslam_ref.features.vocabulary.database import Database, Found, best
+from vslam_ref.features.vocabulary.database import Database, QueryResult, best
 from vslam_ref.features.vocabulary.matching import Matched, Matching, match, turned_alike
 from vslam_ref.features.vocabulary.training import inverse_document_frequency, train
 from vslam_ref.features.vocabulary.tree import (
@@ -33,7 +33,7 @@ __all__ = [
     "Bag",
     "Database",
     "Descended",
-    "Found",
+    "QueryResult",
     "Matched",
     "Matching",
     "Vocabulary",

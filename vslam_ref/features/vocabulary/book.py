@@ -63,15 +63,15 @@ def k_medians(descriptors: list[Bits], k: int, rng: np.random.Generator) -> tupl
 
 
 @dataclass
-class Node:
+class TreeNode:
     """A centre with what is below it; a leaf has the number of its word."""
 
     centre: Bits = ()
-    children: list[Node] = field(default_factory=list)
+    children: list[TreeNode] = field(default_factory=list)
     word: int = -1
 
 
-def descend(root: Node, descriptor: Bits) -> int:
+def descend(root: TreeNode, descriptor: Bits) -> int:
     """Word of a descriptor: at each node on to the nearest child."""
     node = root
     while node.children:

@@ -32,8 +32,8 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features.vocabulary import (
     Bag,
     Database,
-    Found,
     Matching,
+    QueryResult,
     Vocabulary,
     bag,
     descend,
@@ -109,7 +109,7 @@ class RecognitionSettings:
             raise ValueError(f"{self}: need pixels and square above 0, and 1 <= likely <= sure")
 
 
-class Picture(NamedTuple):
+class DescribedPicture(NamedTuple):
     """Features of a picture, and their words.
 
     Attributes
@@ -173,16 +173,16 @@ NOTHING = Verified(-1, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
 def described(
     vocabulary: Vocabulary, uv: Array, angle: Array, descriptor: NDArray[np.uint8], level: int
-) -> Picture:
+) -> DescribedPicture:
     """Give features ``uv (N, 2)``, pixels, with ``angle (N,)``, radians, and ``descriptor (N, 32)`` words."""
     leaf = descend(vocabulary, descriptor).node
     seen = bag(vocabulary, vocabulary.word[leaf])
-    return Picture(uv, angle, descriptor, nodes_at_level(vocabulary, leaf, level), seen)
+    return DescribedPicture(uv, angle, descriptor, nodes_at_level(vocabulary, leaf, level), seen)
 
 
 def proposed(
     index: Database, query: Bag, least: float, allowed: NDArray[np.bool_], settings: RecognitionSettings
-) -> Found:
+) -> QueryResult:
     """Candidates of a picture: of each of the best groups of neighbours the best picture.
 
     Parameters
@@ -198,7 +198,7 @@ def proposed(
 
     Returns
     -------
-    Found
+    QueryResult
         Scores are those of the groups, growing no more.
     """
     found = index.query(query, allowed)
@@ -224,11 +224,15 @@ def proposed(
     common = np.zeros(len(index), np.int64)
     common[found.entry] = found.common
     at = np.array(chosen, np.int64)
-    return Found(at, total[at], common[at])
+    return QueryResult(at, total[at], common[at])
 
 
 def verified(
-    a: Picture, b: Picture, entry: int, rng: np.random.Generator, settings: RecognitionSettings
+    a: DescribedPicture,
+    b: DescribedPicture,
+    entry: int,
+    rng: np.random.Generator,
+    settings: RecognitionSettings,
 ) -> Verified:
     """Pairs of two pictures that agree on an epipolar geometry; no camera is needed."""
     pairs = match(a.descriptor, b.descriptor, a.node, b.node, settings.matching)
@@ -271,7 +275,7 @@ class Recogniser:
         self.vocabulary, self.rng = vocabulary, rng
         self.settings = settings or RecognitionSettings()
         self.index = Database(vocabulary.words)
-        self.pictures: list[Picture] = []
+        self.pictures: list[DescribedPicture] = []
         self._before = NOTHING
 
     def see(self, uv: Array, angle: Array, descriptor: NDArray[np.uint8]) -> Recognition:
