@@ -46,6 +46,13 @@ def test_no_common_node_no_pair() -> None:
         match(a, a, np.array([1, 1]), np.array([2, 2, 2]))
 
 
+def test_of_two_that_want_the_same_the_nearer_one_gets_it() -> None:
+    a, b = (np.repeat(np.array(rows, np.uint8), 32, axis=1) for rows in ([[1], [3]], [[1], [255]]))
+    zero = np.zeros(2, np.int64)
+    found = match(a, b, zero, zero)
+    assert (found.first.tolist(), found.second.tolist()) == ([0], [0])
+
+
 def test_turns_that_differ_from_most_are_left_out() -> None:
     """Sixty pairs turn by 1.0 +- 0.05 radians: within two bins of 12 degrees; ten turn anyhow."""
     rng = np.random.default_rng(0)
