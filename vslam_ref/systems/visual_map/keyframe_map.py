@@ -13,12 +13,13 @@ needs to live.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.features import level_sigma
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.visual_map.rows import Rows
 
@@ -45,9 +46,6 @@ class KeyframeMap:
     sightings: Rows = field(kw_only=True)
     version: int = field(default=0, kw_only=True)
 
-    level_step: ClassVar[float] = 2.0
-    """Width of a level's pixel over that of the next finer one."""
-
     @property
     def T_kf_world(self) -> Array:
         """Poses of the keyframes, (K, 4, 4)."""
@@ -69,7 +67,7 @@ class KeyframeMap:
 
     def level_sigma(self, level: ArrayLike) -> Array:
         """Standard deviation of what is found on a level, in pixels of level 0."""
-        return np.asarray(self.level_step ** np.asarray(level, np.float64))
+        return level_sigma(level)
 
     def lives(self, on: BoolArray) -> BoolArray:
         """Which points (N,) may live with the sightings (M,) that are left: those seen twice."""
