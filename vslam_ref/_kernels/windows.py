@@ -22,7 +22,7 @@ def _bits(p, i, q, j):
 
 @kernel(given(2), given(1), WHOLE, WHOLE, ROWS, given(2), WHOLE, ROWS, returns=THREE)
 def search(uv, radius, low, high, descriptor, feature_uv, octave, feature_descriptor):
-    """Twin of :func:`vslam_ref.systems.orbslam.window_search._search`: features in the order of their rows."""
+    """Twin of :func:`vslam_ref.systems.orbslam.window_search._search`: features from above to below."""
     count = uv.shape[0]
     best, least = np.full(count, -1), np.full(count, FAR)
     second = np.full(count, FAR)
@@ -51,3 +51,25 @@ def search(uv, radius, low, high, descriptor, feature_uv, octave, feature_descri
             if j != best[i] and octave[j] == octave[best[i]] and distance[k] < second[i]:
                 second[i] = distance[k]
     return best, least, second
+
+
+@kernel(
+    given(2), ROWS, given(2), given(3), given(1), ROWS, types.float64,
+    returns=types.UniTuple(types.Array(types.int64, 1, "C"), 2),
+)  # fmt: skip
+def search_lines(line, descriptor, bearing, J_pixel, width, other, distance):
+    """Twin of :func:`vslam_ref.systems.orbslam.mapper.new_points._search`: a pair at a time."""
+    best, least = np.full(line.shape[0], -1), np.full(line.shape[0], FAR)
+    p, q = _words(descriptor), _words(other)
+    for i in range(line.shape[0]):
+        x, y, z = line[i, 0], line[i, 1], line[i, 2]
+        for j in range(bearing.shape[0]):
+            e = x * bearing[j, 0] + y * bearing[j, 1] + z * bearing[j, 2]
+            gx = x * J_pixel[j, 0, 0] + y * J_pixel[j, 1, 0] + z * J_pixel[j, 2, 0]
+            gy = x * J_pixel[j, 0, 1] + y * J_pixel[j, 1, 1] + z * J_pixel[j, 2, 1]
+            d = distance * width[j]
+            if e * e <= d * d * (gx * gx + gy * gy):
+                bits = _bits(p, i, q, j)
+                if bits < least[i]:
+                    best[i], least[i] = j, bits
+    return best, least

@@ -16,6 +16,4 @@ def describe_picture(number: int, grey: ArrayLike, settings: FeatureSettings) ->
     image = np.asarray(grey)
     x, y = np.rint(features.uv).astype(np.int64).T
     height, width = image.shape
-    return DescribedPicture(
-        number, features, image[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
-    )
+    return DescribedPicture(number, features, image[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)])
