@@ -26,8 +26,8 @@ nearest three that fit: the Sampson distance, of three pictures.  No point can l
 
 * an answer is told apart from another one as in :mod:`~vslam_ref.geometry.multiview.two_views.choice`;
 * the best answer must *agree* with the third picture: the two equations that it adds may not cost more, each,
-  than the one of the pair, by the same ratio (or ``agree``) and margin.  What moved while it was seen (people, a rolling
-  shutter) can fit two pictures, and then fails here.
+  than the one of the pair, by the same ratio (or ``agree``) and margin.  What moved while it was seen
+  (people, a rolling shutter) can fit two pictures, and then fails here.
 
 A straight path without a turn is the exception: the plane of the wrong answer then lies across the direction
 of motion in every picture, and moves only with the square of the base line.  Then nothing is told apart.

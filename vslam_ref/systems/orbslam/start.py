@@ -29,8 +29,6 @@ from vslam_ref.systems.orbslam.window_search import Places, assigned, search_win
 from vslam_ref.systems.visual_map.starting import DRAWS, Between, Pair, judge_start, one_pixel, unit_depth
 from vslam_ref.systems.visual_map.telling import Attempt
 
-FIRST = "the first picture"
-"""Why nothing is tried with it."""
 BIN = 2 * np.pi / 30
 """Of the histogram of turns: matches whose turn is not among the commonest are wrong."""
 
