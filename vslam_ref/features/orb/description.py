@@ -99,10 +99,20 @@ def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
 @accelerated("orb:describe")
 def _describe(flat: Bytes, width: int, xy: Pixels, direction: Array, pairs: IntArray) -> Bytes:
     """Descriptors (n, len(pairs) / 8) in a picture in rows (H * width,); pairs (m, 4) are x, y, x, y."""
-    c, s = direction[:, 0, None, None], direction[:, 1, None, None]
-    x, y = pairs[:, 0::2], pairs[:, 1::2]  # (m, 2): of the first pixel and of the second
-    dx = np.rint(c * x - s * y).astype(np.int64)  # (n, m, 2) eq-orb-steer
-    dy = np.rint(s * x + c * y).astype(np.int64)
-    at = (xy[:, 1].astype(np.int64) * width + xy[:, 0])[:, None, None] + dy * width + dx
-    value = flat[at]
+    value = _turned(flat, width, xy, direction, pairs.reshape(-1, 2)).reshape(len(xy), len(pairs), 2)
     return np.packbits(value[..., 0] < value[..., 1], axis=1, bitorder="little")  # eq-orb-test
+
+
+def turned_pixels(smoothed: Bytes, xy: Pixels, direction: Array, offset: IntArray) -> Bytes:
+    """Grey levels (n, m) around each pixel (n, 2), at offsets (m, 2) in pixels that turn with the directions.
+
+    Implements :eq:`eq-orb-steer`.
+    """
+    return _turned(smoothed.reshape(-1), smoothed.shape[1], xy, direction, offset)
+
+
+def _turned(flat: Bytes, width: int, xy: Pixels, direction: Array, offset: IntArray) -> Bytes:
+    c, s = direction[:, 0, None], direction[:, 1, None]
+    dx = np.rint(c * offset[:, 0] - s * offset[:, 1]).astype(np.int64)  # (n, m) eq-orb-steer
+    dy = np.rint(s * offset[:, 0] + c * offset[:, 1]).astype(np.int64)
+    return flat[(xy[:, 1].astype(np.int64) * width + xy[:, 0])[:, None] + dy * width + dx]
