@@ -91,10 +91,10 @@ def test_the_same_features_answer(draw_map, radius: float) -> None:
 
 def test_a_picture_is_tracked_as_the_book_does(draw_map) -> None:
     """Both take ten steps with the same weights: they differ by rounding, times the condition of H, 1e4."""
-    made = draw_map(points=200, share=0.9).map
+    made = draw_map(points=100, share=0.9).map
     features = seen_anew(made, T_NEXT, 2)
     T_last, v = se3.exp([0.1, 0, 0, 0, 0, 0]), se3.log(T_NEXT @ se3.exp([-0.11, 0.01, 0, 0, 0, 0]))
-    last = set(range(0, 200, 2))
+    last = set(range(0, 100, 2))
     told = tracking.track(CAMERA, SIZE, as_points(made), last, as_features(features), T_last, v)
     assert told is not None
     tracker = FeatureTracker(S, np.random.default_rng(0), T_last, np.array(sorted(last)))
@@ -127,11 +127,11 @@ def test_both_are_lost_without_features(draw_map) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_features_are_matched_along_the_same_curves(draw_map, seed: int) -> None:
-    made = draw_map(points=60, share=1.0, seed=seed).map
-    made.remove_points(np.arange(60))  # all features are free again, and their descriptors are random
+    made = draw_map(points=24, share=1.0, seed=seed).map
+    made.remove_points(np.arange(24))  # all features are free again, and their descriptors are random
     rng = np.random.default_rng(seed)
     rows = [made.features(k) for k in (1, 4)]
-    alike = made.sightings["descriptor"][rows[0]] ^ np.packbits(rng.random((61, 256)) < 0.08, axis=1)
+    alike = made.sightings["descriptor"][rows[0]] ^ np.packbits(rng.random((25, 256)) < 0.08, axis=1)
     made.sightings["descriptor"][rows[1]] = alike
     made.sightings["descriptor"][rows[1]][::7] = made.sightings["descriptor"][rows[1]][0]
     a, b = (new_points.free_side(made, k) for k in (1, 4))
@@ -144,7 +144,7 @@ def test_features_are_matched_along_the_same_curves(draw_map, seed: int) -> None
     i, j = new_points.match(a, b, T_b_a, 1.96, 50)
     told = mapping.matches(CAMERA, *corners, T_b_a, 1.96, 50)
     assert list(zip(i.tolist(), j.tolist(), strict=True)) == told
-    assert len(told) > 30
+    assert len(told) > 12
 
 
 def shown(made: FeatureMap) -> mapping.Sees:
@@ -172,6 +172,8 @@ def test_the_tree_is_the_books(draw_map, seed: int) -> None:
 def test_fusing_is_the_books(draw_map, seed: int) -> None:
     """Points are moved onto features that show others, or none: what is found there is fused."""
     made, _ = draw_map(keyframes=5, points=40, share=0.4, seed=seed)
+    made.sightings["level"][:] = 0
+    made.refresh(np.arange(40))
     kf = 3
     seen = made.point_of(kf)
     strangers = np.setdiff1d(np.arange(40), seen)
@@ -183,8 +185,9 @@ def test_fusing_is_the_books(draw_map, seed: int) -> None:
             continue
         other = int(seen[f])
         made.points["X_world"][p] = made.X_world[other]
-        for name in ("descriptor", "normal", "distance_range"):
+        for name in ("normal", "distance_range"):
             made.points[name][p] = made.points[name][other]
+        made.points["descriptor"][p] = made.sightings["descriptor"][made.features(kf).start + f]
         told = mapping.fuse(told, kf, f, p)
         fuse.fuse(made, kf, np.array([p]), 3.0, 50)
         assert shown(made) == told
