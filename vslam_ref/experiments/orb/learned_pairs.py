@@ -76,7 +76,7 @@ def table() -> str:
     )
 
 
-HEAD = '''"""Which pixels are compared: 256 pairs, x and y of the first pixel and of the second, from the centre.
+HEAD = '''"""Which pixels are compared: 256 pairs of offsets from the centre of a patch.
 
 Learned, not drawn: written by ``{command}``, seed {seed}.
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import IntArray
-from vslam_ref.features.corners import in_rows, is_peak
-from vslam_ref.features.fast import Pixels, corner_score, segment_test
+from vslam_ref.features.corners import Corners, detect, is_peak
+from vslam_ref.features.fast import Pixels, corner_score
 from vslam_ref.features.levels import Bytes
 
 ARC = 9
@@ -34,31 +34,32 @@ def candidates(image: Bytes, threshold: int, low_threshold: int, cell: int) -> C
     threshold, low_threshold : int
         Grey levels.  In a cell with a peak at ``threshold``, those below it are left out.
     cell : int
-        Side of a cell, pixels, at least 3.
+        Side of a cell, pixels.
 
     Returns
     -------
     Candidates
     """
-    found = _peaks(image, segment_test(image, threshold, ARC))
-    y, x = (np.arange(n) // cell for n in image.shape)
-    full = np.zeros((y[-1] + 1, x[-1] + 1), np.bool_)
-    full[y[found.xy[:, 1]], x[found.xy[:, 0]]] = True
-    low = segment_test(image, low_threshold, ARC)
-    beside = np.zeros(len(low), np.bool_)  # a peak is compared with neighbours in other cells, too
-    for step in ((-1, -1), (1, -1), (-1, 1), (1, 1)):
-        i, j = np.clip(low + step, 0, np.array(image.shape[::-1]) - 1).T
-        beside |= ~full[y[j], x[i]]
-    more = _peaks(image, low[beside])
-    empty = ~full[y[more.xy[:, 1]], x[more.xy[:, 0]]]  # eq-orb-cell
-    xy, score = np.concatenate([found.xy, more.xy[empty]]), np.concatenate([found.score, more.score[empty]])
+    found = _peaks(image, detect(image, threshold, ARC))
+    full = np.zeros([n // cell + 3 for n in image.shape], np.bool_)  # with a cell more on each side
+    full[tuple(found.xy.T[::-1] // cell + 1)] = True
+    empty = ~full
+    empty[:, [0, -1]] = empty[[0, -1]] = False
+    near = np.any([np.roll(empty, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
+    low = detect(image, low_threshold, ARC)
+    more = _peaks(image, low.only(near[tuple(low.xy.T[::-1] // cell + 1)]))
+    alone = empty[tuple(more.xy.T[::-1] // cell + 1)]  # eq-orb-cell
+    xy, score = np.concatenate([found.xy, more.xy[alone]]), np.concatenate([found.score, more.score[alone]])
     order = np.lexsort(xy.T)
     return Candidates(xy[order], score[order])
 
 
-def _peaks(image: Bytes, xy: Pixels) -> Candidates:
-    """Those of the corners, in row order, that are above their neighbours and not near the border."""
-    score = corner_score(image, xy, ARC)
-    inside = (xy >= BORDER).all(1) & (xy < np.array(image.shape[::-1]) - BORDER).all(1)
-    keep = inside & is_peak(in_rows(xy, (image.shape[0], image.shape[1])), score)
-    return Candidates(xy[keep], score[keep])
+def _peaks(image: Bytes, corners: Corners) -> Candidates:
+    """Those of the corners that are above their neighbours and not near the border."""
+    score = corner_score(image, corners.xy, ARC)
+    keep = is_peak(corners, score)
+    xy, score = corners.xy[keep], score[keep]
+    x, y = xy.T
+    height, width = image.shape
+    inside = (x >= BORDER) & (x < width - BORDER) & (y >= BORDER) & (y < height - BORDER)
+    return Candidates(xy[inside], score[inside])

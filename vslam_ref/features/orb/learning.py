@@ -1,9 +1,9 @@
 """Which 256 pairs tell patches apart: tests that are often right and often wrong, and no two that agree.
 
 A pair is worth more the nearer its test is to being true for half of all patches: then its bit varies most.
-And a pair that says what others said already is worth nothing.  So the candidates are sorted by the distance
-of their mean from one half, and taken in this order, each unless its correlation with one that was taken is at
-or above a limit.  Where too few are left, the limit is raised, and all begins anew.
+And a pair that says what others said already is worth nothing.  So the candidates are sorted by the
+distance of their mean from one half, and taken in this order, each unless its correlation with one that was
+taken is at or above a limit.  Where too few are left, the limit is raised, and all begins anew.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def patches(image: ArrayLike, settings: OrbSettings) -> Bytes:
 
 
 def drawn(count: int, rng: np.random.Generator) -> IntArray:
-    """``count`` different pairs of pixels (count, 2), numbers in ``GRID`` without unit, the first one smaller."""
+    """``count`` different pairs (count, 2) of numbers in ``GRID``, without unit, the first one smaller."""
     size = len(GRID)
     at = rng.choice(size * (size - 1) // 2, count, replace=False)
     first, second = np.triu_indices(size, 1)
@@ -145,7 +145,7 @@ def _counted(packed: Words) -> IntArray:
 def _greedy(
     packed: Words, count: IntArray, n: int, limit: float, wanted: int, known: dict[int, Array]
 ) -> list[int]:
-    """Take candidates in their order; strike out all whose correlation with one that was taken is too large."""
+    """Take candidates in their order; strike out all that are too much correlated with one taken."""
     left = count % n > 0  # what is always true, or never, tells nothing
     taken: list[int] = []
     while left.any() and len(taken) < wanted:

@@ -1,4 +1,4 @@
-"""Which pixels are compared: 256 pairs, x and y of the first pixel and of the second, from the centre.
+"""Which pixels are compared: 256 pairs of offsets from the centre of a patch.
 
 Learned, not drawn: written by ``python -m vslam_ref.experiments.orb.learned_pairs``, seed 2011.
 

@@ -20,7 +20,7 @@ class OrbSettings:
     threshold, low_threshold : int
         Grey levels of FAST-9; the lower one counts in cells without a corner at the higher one.
     cell : int
-        Side of a cell, pixels of the octave, at least 3.
+        Side of a cell, pixels of the octave.
     spread : bool
         Whether a quadtree spreads the features over the picture; else those with the best response are kept.
 
@@ -46,7 +46,7 @@ class OrbSettings:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for name, least in {"features": 0, "octaves": 1, "cell": 3}.items():
+        for name, least in {"features": 0, "octaves": 1, "cell": 1}.items():
             if getattr(self, name) < least:
                 raise ValueError(f"{name} is {getattr(self, name)}: need at least {least}")
         if not 1 < self.scale <= 2:
