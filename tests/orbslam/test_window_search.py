@@ -57,7 +57,9 @@ def test_the_answer_is_the_first_of_the_nearest(seed: int, backend: str) -> None
 def test_a_feature_answers_the_nearest_place_only() -> None:
     """Places 0 to 2 want feature 4: the second is nearest; 3 is too far, 4 not clearly nearest, 5 has none."""
     answers = Answers(
-        np.array([4, 4, 4, 1, 2, -1]), np.array([30, 20, 20, 120, 40, 257]), np.array([257, 257, 257, 257, 45, 257])
+        np.array([4, 4, 4, 1, 2, -1]),
+        np.array([30, 20, 20, 120, 40, 257]),
+        np.array([257, 257, 257, 257, 45, 257]),
     )
     assert assigned(answers, limit=100, ratio=0.8, room=5).tolist() == [-1, 4, -1, -1, -1, -1]
     assert assigned(answers, limit=120, ratio=1.0, room=5).tolist() == [-1, 4, -1, 1, 2, -1]
