@@ -15,7 +15,7 @@ S = Settings()
 
 def freed(draw_map, seed: int = 0):
     """A map whose points 20 to 59 are taken away again; the same descriptors show them everywhere."""
-    made, sees = draw_map(keyframes=4, points=60, share=1.0, seed=seed)
+    made = draw_map(keyframes=4, points=60, share=1.0, seed=seed).map
     table = made.sightings
     for k in range(1, 4):
         table["descriptor"][made.features(k)][:60] = table["descriptor"][made.features(0)][:60]

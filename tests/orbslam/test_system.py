@@ -1,4 +1,4 @@
-"""The system over a small film: every picture tracked, the map thinned out, and what happens when it is lost."""
+"""The system over a small film: every picture tracked, the map thinned out, a lost camera found again."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def test_every_picture_has_a_pose_those_before_the_start_too(film: Film, desk: R
     centres = camera_pose.centre_from_pose(T[:FRAMES])
     truth = camera_pose.centre_from_pose(film.T_cam_world)
     error = np.linalg.norm(align(centres, truth, with_scale=True).act(centres) - truth, axis=1)
-    # corners lie on whole pixels of their octave: about half a pixel of 256 at 2 m, over the root of 100 points:
-    # 0.4 mm; the map's own error is several times that, so ten times as much is allowed
+    # corners lie on whole pixels of their octave: about half a pixel of 256 at 2 m, over the root of 100
+    # points: 0.4 mm; the map's own error is several times that, so ten times as much is allowed
     assert np.sqrt(np.mean(error**2)) < 0.004
 
 

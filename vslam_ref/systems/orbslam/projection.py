@@ -49,7 +49,10 @@ class Expected(NamedTuple):
 
 
 def expected(feature_map: FeatureMap, points: IntArray, T_cam_world: Array) -> Expected:
-    """Points (n,) that a camera at a pose (4, 4) should see, the map's own unit."""
+    """Points (n,) that a camera at a pose (4, 4) should see, the map's own unit.
+
+    Implements :eq:`eq-expected-octave`.
+    """
     table = feature_map.points
     X_cam = se3.act(T_cam_world, table["X_world"][points])
     ray = table["X_world"][points] - camera_pose.centre_from_pose(T_cam_world)

@@ -23,7 +23,7 @@ class Pass(NamedTuple):
     tried : ndarray of int64, shape (n,)
         Points that were expected.
     point, feature : ndarray of int64, shape (m,)
-        Points that were found, and the features that show them.
+        Points that were found, and the features that show them; numbers without a unit.
     pose : TrackedPose
         With the weights (m,).
     """
@@ -70,7 +70,11 @@ def posed(
     T_guess: Array,
     s: TrackerSettings,
 ) -> Pass:
-    """Pose from features (m,) that show points (m,), near a guess (4, 4), the map's own unit."""
+    """Pose from features that show points, near a guess.
+
+    ``feature (m,)`` shows ``point (m,)``; ``tried (n,)`` is only passed on.  The guess ``T_guess (4, 4)``
+    is in the map's own unit.
+    """
     with stage("pose"):
         pose = track_pose(
             feature_map.camera,

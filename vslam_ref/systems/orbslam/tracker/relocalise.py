@@ -22,7 +22,7 @@ Candidates = Callable[[FeatureMap, OrbFeatures, int], IntArray]
 
 
 class Shown(NamedTuple):
-    """Features (m,) of a picture that show points (m,)."""
+    """Features ``feature (m,)`` of a picture that show ``point (m,)``; numbers without a unit."""
 
     feature: IntArray
     point: IntArray

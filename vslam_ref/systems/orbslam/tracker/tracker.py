@@ -76,7 +76,7 @@ class TrackedFeatures(NamedTuple):
 
 @dataclass
 class FeatureTracker:
-    """What the tracker remembers: T_last (4, 4) and the points seen last, the map's own unit."""
+    """What the tracker remembers: ``T_last (4, 4)``, the map's own unit, and ``points (n,)`` seen last."""
 
     settings: Settings
     rng: np.random.Generator
