@@ -138,7 +138,7 @@ def test_features_are_matched_along_the_same_curves(draw_map, seed: int) -> None
     T_b_a = se3.compose(made.T_kf_world[4], se3.inverse(made.T_kf_world[1]))
     octave = made.sightings["level"][rows[0]].tolist()
     corners = [
-        [mapping.Corner(u, k, bits(d)) for u, k, d in zip(side.uv, octave, side.descriptor, strict=True)]
+        [mapping.FreeCorner(u, k, bits(d)) for u, k, d in zip(side.uv, octave, side.descriptor, strict=True)]
         for side in (a, b)
     ]
     i, j = new_points.match(a, b, T_b_a, 1.96, 50)

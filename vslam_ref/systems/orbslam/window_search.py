@@ -42,7 +42,7 @@ class Places(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Best ``feature (m,)`` of each place, or -1; its ``distance (m,)`` in bits; the next one's, ``second (m,)``."""
+    """Best ``feature (m,)`` of each place, or -1; its ``distance (m,)`` and the ``second (m,)``, in bits."""
 
     feature: IntArray
     distance: IntArray

@@ -18,7 +18,7 @@ Sees = dict[int, dict[int, int]]
 """Keyframe -> feature -> point."""
 
 
-class Corner(NamedTuple):
+class FreeCorner(NamedTuple):
     """A feature that shows no point: place u (2,) in pixels of octave 0, octave, descriptor."""
 
     u: Array
@@ -64,7 +64,9 @@ def curve_distance(camera: Camera, u_a: Array, u_b: Array, T_b_a: Array) -> floa
     return float(abs(b.bearing @ normal) / np.linalg.norm(slope))  # eq-curve-distance
 
 
-def best_on_curve(camera: Camera, corner: Corner, others: list[Corner], T_b_a: Array, limit: float) -> int:
+def best_on_curve(
+    camera: Camera, corner: FreeCorner, others: list[FreeCorner], T_b_a: Array, limit: float
+) -> int:
     """Number of the corner near the curve that differs least; -1 without one.
 
     Implements :eq:`eq-curve-distance`; the limit is in pixels of the octave of the other corner, the motion
@@ -79,7 +81,7 @@ def best_on_curve(camera: Camera, corner: Corner, others: list[Corner], T_b_a: A
 
 
 def matches(
-    camera: Camera, a: list[Corner], b: list[Corner], T_b_a: Array, limit: float, bits: int
+    camera: Camera, a: list[FreeCorner], b: list[FreeCorner], T_b_a: Array, limit: float, bits: int
 ) -> list[tuple[int, int]]:
     """Pairs that are each other's best on the curve; limits in pixels and bits; T_b_a (4, 4), own unit."""
     T_a_b = np.asarray(np.linalg.inv(T_b_a))

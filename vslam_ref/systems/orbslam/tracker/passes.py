@@ -15,7 +15,7 @@ from vslam_ref.systems.orbslam.projection import expected, find
 from vslam_ref.systems.orbslam.settings import FeatureSettings, TrackerSettings
 
 
-class Pass(NamedTuple):
+class FeaturePass(NamedTuple):
     """Points that were looked for in a picture, and the pose.
 
     Attributes
@@ -52,7 +52,7 @@ def look_for(
     radius: float,
     s: TrackerSettings,
     f: FeatureSettings,
-) -> Pass:
+) -> FeaturePass:
     """Look for points (n,) where a pose (4, 4) puts them, in pixels of their octave; improve the pose."""
     with stage("search"):
         at = expected(feature_map, points, T_guess)
@@ -69,7 +69,7 @@ def posed(
     features: OrbFeatures,
     T_guess: Array,
     s: TrackerSettings,
-) -> Pass:
+) -> FeaturePass:
     """Pose from features that show points, near a guess.
 
     ``feature (m,)`` shows ``point (m,)``; ``tried (n,)`` is only passed on.  The guess ``T_guess (4, 4)``
@@ -85,4 +85,4 @@ def posed(
             steps=s.steps,
             least_sigma=s.least_sigma,
         )
-    return Pass(tried, point, feature, pose)
+    return FeaturePass(tried, point, feature, pose)
