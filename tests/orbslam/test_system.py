@@ -33,7 +33,7 @@ class Run(NamedTuple):
 
 
 LARGEST_SHARE = 0.009
-"""Of the path: what the system promises on the recorded drive."""
+"""Of the path: what the system is to reach on the recorded drive."""
 
 
 def share_of_path(film: Film, system: OrbSlam) -> float:
@@ -73,8 +73,8 @@ def test_every_picture_has_a_pose_those_before_the_start_too(film: Film, desk: R
     assert share_of_path(film, desk.system) < LARGEST_SHARE
 
 
-def test_without_adjustment_the_path_is_not_right(film: Film, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bound is not met by luck: without adjustments the path misses it."""
+def test_adjustments_make_the_path_better(film: Film, desk: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What tracking and triangulation alone reach is worse by a third at least."""
 
     def nothing(*_: object, **__: object) -> None:
         return None
@@ -84,7 +84,7 @@ def test_without_adjustment_the_path_is_not_right(film: Film, monkeypatch: pytes
     system = OrbSlam(film.camera)
     for k, grey in enumerate(film.pictures):
         system.step(k, grey)
-    assert share_of_path(film, system) > LARGEST_SHARE
+    assert share_of_path(film, desk.system) < 0.75 * share_of_path(film, system)
 
 
 def test_each_keyframe_is_handed_on_and_the_map_is_thinned_out(desk: Run) -> None:
@@ -115,7 +115,7 @@ def test_blank_pictures_alone_are_lost_and_the_next_one_is_found_again(desk: Run
 def test_without_relocalisation_it_stays_lost(film: Film) -> None:
     system = OrbSlam(
         film.camera,
-        Settings(features=FeatureSettings(features=700), tracker=TrackerSettings(relocalise=False)),
+        Settings(tracker=TrackerSettings(relocalise=False)),
     )
     for k in range(20):
         system.step(k, film.pictures[k])
@@ -162,13 +162,13 @@ def test_a_camera_that_rests_or_turns_does_not_start(film: Film) -> None:
 
 
 def test_a_chosen_start_is_tried_once(film: Film) -> None:
-    system = OrbSlam(film.camera, chosen=ChosenStart(2, 10))
-    outcomes = [system.step(k, film.pictures[k]) for k in range(12)]
+    system = OrbSlam(film.camera, chosen=ChosenStart(3, 14))
+    outcomes = [system.step(k, film.pictures[k]) for k in range(16)]
     tried = [o for o in outcomes if o.attempt is not None]
-    assert [o.number for o in tried] == [10]
+    assert [o.number for o in tried] == [14]
     assert isinstance(tried[0].attempt, Attempt)
-    assert system.started_at == (2, 10)
-    assert sorted(system.poses) == list(range(2, 12))
+    assert system.started_at == (3, 14)
+    assert sorted(system.poses) == list(range(3, 16))
 
 
 def test_pictures_of_another_size_are_refused(film: Film) -> None:
