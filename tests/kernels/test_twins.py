@@ -37,6 +37,7 @@ from . import (
     rows_visual_map,
     rows_vocabulary,
 )
+from . import rows_bundle, rows_features, rows_orb, rows_orbslam, rows_pose, rows_rendered, rows_visual_map
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 
@@ -182,6 +183,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     **rows_bundle.ROWS,
     **rows_features.ROWS,
     **rows_orb.ROWS,
+    **rows_orbslam.ROWS,
     **rows_pose.ROWS,
     **rows_posegraph.ROWS,
     **rows_rendered.ROWS,
