@@ -59,7 +59,7 @@ class Correction(NamedTuple):
     S_world_kf : ndarray, shape (K, 4, 4)
         With the scale of each: from the keyframe's old unit into the world.
     T_kf_world : ndarray, shape (K, 4, 4)
-        Poses of the cameras.
+        Poses of the cameras; translations in the unit of the map.
     solution : GraphSolution
         The descent's own record.
     """
@@ -84,7 +84,7 @@ def close_loop(
     Parameters
     ----------
     T_kf_world : array_like, shape (K, 4, 4)
-        Poses before the closing.
+        Poses before the closing; translations in the unit of the map.
     edges : EssentialEdges
         Of before the closing.
     loop : Loop
