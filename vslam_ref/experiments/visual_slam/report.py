@@ -108,11 +108,8 @@ def write_paths(folder: Path, run: Run, visual_map: VisualMap) -> None:
 def write_map(target: Path, visual_map: VisualMap) -> None:
     """Write the living points, each in the grey of the picture in which it was first seen."""
     whole = as_problem(visual_map)
-    kf = visual_map.points["source_kf"][whole.points]
     height, width = visual_map.shape
-    u, v = np.rint(visual_map.points["source_uv"][whole.points]).astype(np.int64).T
-    grey = visual_map.image(0)[kf, np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)]
-    colours = np.repeat(grey[:, None], 3, axis=1)
+    colours = np.repeat(visual_map.greys(whole.points)[:, None], 3, axis=1)
     sizes = np.array([[width, height]])
     write_ply(target, BundleFile(whole.problem, colours=colours, image_sizes=sizes))
 

@@ -1,1 +1,1 @@
-"""ORB-SLAM: tracking, mapping and loop closing on one kind of feature."""
+"""ORB-SLAM."""

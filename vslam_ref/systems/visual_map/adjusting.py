@@ -20,9 +20,8 @@ from vslam_ref.estimation.bundle import (
 )
 from vslam_ref.estimation.bundle.local import local_problem
 from vslam_ref.estimation.bundle.self_calibration import SelfCalibration, self_calibrate
-from vslam_ref.features import level_sigma
 from vslam_ref.geometry.cameras import Camera
-from vslam_ref.systems.visual_map.visual_map import VisualMap, neighbours
+from vslam_ref.systems.visual_map.keyframe_map import KeyframeMap, neighbours
 
 
 class Adjusted(NamedTuple):
@@ -44,15 +43,16 @@ class Adjusted(NamedTuple):
 
 
 class _Whole(NamedTuple):
-    """A map as a problem: which points and sightings of the map its rows are."""
+    """A map as a problem: which keyframes, points and sightings of the map its rows are."""
 
     problem: BundleProblem
+    views: IntArray
     points: IntArray
     sightings: IntArray
 
 
 def adjust(
-    visual_map: VisualMap,
+    visual_map: KeyframeMap,
     robust: Robust,
     *,
     active: ArrayLike | None = None,
@@ -65,7 +65,7 @@ def adjust(
 
     Parameters
     ----------
-    visual_map : VisualMap
+    visual_map : KeyframeMap
         Changed in place.
     robust : Robust
         Tukey's loss with an adaptive scale.
@@ -83,14 +83,14 @@ def adjust(
     if active is None:
         result = bundle_adjust(whole.problem, robust, options)
         return _put_back(visual_map, whole, result.problem.scene, result)
-    part = local_problem(whole.problem, active)
+    part = local_problem(whole.problem, np.searchsorted(whole.views, active))
     result = bundle_adjust(part.problem, robust, options)
     scene = part.put_back(whole.problem, result.problem.scene).scene
     return _put_back(visual_map, whole, scene, result, part.observations)
 
 
 def adjust_with_camera(
-    visual_map: VisualMap,
+    visual_map: KeyframeMap,
     camera: Camera,
     names: tuple[str, ...],
     robust: Robust,
@@ -104,7 +104,7 @@ def adjust_with_camera(
 
     Parameters
     ----------
-    visual_map : VisualMap
+    visual_map : KeyframeMap
         Changed in place, its camera too, unless there is a reason why not.
     camera : Camera
         The map's own camera, in a model that has the intrinsics to be freed.
@@ -129,10 +129,10 @@ def adjust_with_camera(
 
 
 def _put_back(
-    visual_map: VisualMap, whole: _Whole, scene: Scene, result: BundleResult, rows: IntArray | None = None
+    visual_map: KeyframeMap, whole: _Whole, scene: Scene, result: BundleResult, rows: IntArray | None = None
 ) -> Adjusted:
     """Write a scene into the map, and take back what had no weight; rows of the problem, all by default."""
-    visual_map.T_kf_world[:] = scene.T_cam_world
+    visual_map.T_kf_world[whole.views] = scene.T_cam_world
     visual_map.X_world[whole.points] = scene.X_world
     wrong = np.flatnonzero((result.weights <= 0.0) | ~result.valid)
     wrong = wrong if rows is None else rows[wrong]
@@ -140,26 +140,25 @@ def _put_back(
     return Adjusted(result, len(wrong), died)
 
 
-def as_problem(visual_map: VisualMap, fixed: ArrayLike = (0,), camera: Camera | None = None) -> _Whole:
+def as_problem(visual_map: KeyframeMap, fixed: ArrayLike = (0,), camera: Camera | None = None) -> _Whole:
     """Return the living points and their sightings as a problem of bundle adjustment, in pixels.
 
     Keyframes ``fixed (f,)`` do not move; ``camera`` is the map's by default.
     """
     seen = visual_map.sightings
     on = np.flatnonzero(seen["on"])
-    points = np.flatnonzero(visual_map.alive)
-    new = np.full(len(visual_map.points), -1)
-    new[points] = np.arange(len(points))
+    views, points = visual_map.used_keyframes(), np.flatnonzero(visual_map.alive)
     camera = camera or visual_map.camera
-    scene = Scene(visual_map.T_kf_world, visual_map.X_world[points], camera.params[None])
-    cov = np.eye(2) * (level_sigma(seen["level"][on]) ** 2)[:, None, None]
-    observed = Observations(seen["kf"][on], new[seen["point"][on]], seen["uv"][on], cov)
+    scene = Scene(visual_map.T_kf_world[views], visual_map.X_world[points], camera.params[None])
+    view, point = np.searchsorted(views, seen["kf"][on]), np.searchsorted(points, seen["point"][on])
+    cov = np.eye(2) * (visual_map.level_sigma(seen["level"][on]) ** 2)[:, None, None]
+    observed = Observations(view, point, seen["uv"][on], cov)
     model = type(camera)
-    free = freedom(model, scene, fixed_views=fixed)
-    return _Whole(BundleProblem(model, scene, observed, free=free), points, on)
+    free = freedom(model, scene, fixed_views=np.searchsorted(views, fixed))
+    return _Whole(BundleProblem(model, scene, observed, free=free), views, points, on)
 
 
-def local_active(visual_map: VisualMap, newest: int, count: int) -> IntArray:
+def local_active(visual_map: KeyframeMap, newest: int, count: int) -> IntArray:
     """Return the newest keyframe and its ``count`` best connected ones, without keyframe 0, which stays."""
     chosen = np.concatenate([[newest], neighbours(visual_map, newest, count)])
     return np.asarray(chosen[chosen != 0], dtype=np.int64)

@@ -1,4 +1,4 @@
-r"""A map of keyframes and points, as arrays; who saw which point where.
+r"""A map whose points are patches of pictures: keyframes, points and sightings as arrays.
 
 ====================  ==============================================================================
 ``keyframes``         ``T_kf_world`` (K, 4, 4); ``frame`` (K,), the number of the picture
@@ -18,19 +18,18 @@ when fewer than two sightings are left.  Nothing here finds anything in an image
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, BoolArray, IntArray, as_array
 from vslam_ref.features import Corners, SmallImage
 from vslam_ref.geometry.cameras import Camera
+from vslam_ref.systems.visual_map.keyframe_map import Bytes, KeyframeMap, Rowlike
 from vslam_ref.systems.visual_map.rows import Rows
 
-Bytes = NDArray[np.uint8]
-Rowlike = NDArray[Any]
-"""Numbers of rows, or a mask of all."""
+__all__ = ["Bytes", "PreparedPicture", "Rowlike", "VisualMap", "slopes"]
 
 
 class PreparedPicture(NamedTuple):
@@ -82,7 +81,7 @@ def _sightings() -> Rows:
 
 
 @dataclass
-class VisualMap:
+class VisualMap(KeyframeMap):
     """Keyframes, points and sightings of one camera.
 
     Parameters
@@ -94,15 +93,12 @@ class VisualMap:
         Of their pyramids.
     """
 
-    camera: Camera
-    shape: tuple[int, int]
     levels: int = 4
-    keyframes: Rows = field(default_factory=_keyframes)
-    points: Rows = field(default_factory=_points)
-    sightings: Rows = field(default_factory=_sightings)
+    keyframes: Rows = field(default_factory=_keyframes, kw_only=True)
+    points: Rows = field(default_factory=_points, kw_only=True)
+    sightings: Rows = field(default_factory=_sightings, kw_only=True)
     corners: list[tuple[Corners, ...]] = field(default_factory=list)
     small: list[SmallImage] = field(default_factory=list)
-    version: int = 0
     _images: list[Rows] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -111,21 +107,6 @@ class VisualMap:
             self._images = [
                 Rows(image=((height >> level, width >> level), np.uint8)) for level in range(self.levels)
             ]
-
-    @property
-    def T_kf_world(self) -> Array:
-        """Poses of the keyframes, (K, 4, 4)."""
-        return self.keyframes["T_kf_world"]
-
-    @property
-    def X_world(self) -> Array:
-        """All points, dead ones too, (N, 3)."""
-        return self.points["X_world"]
-
-    @property
-    def alive(self) -> BoolArray:
-        """Which points are in use, (N,)."""
-        return self.points["alive"]
 
     def image(self, level: int) -> Bytes:
         """Return that level of all keyframes, (K, H >> level, W >> level)."""
@@ -186,37 +167,25 @@ class VisualMap:
         at = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
         return self.sightings.append(len(numbers), kf=kf, point=numbers, level=level, uv=at, on=True)
 
-    def take_back(self, sightings: Rowlike) -> IntArray:
-        """Take sightings back (numbers, or a mask of all); return the points (n,) that die of it."""
+    def lives(self, on: BoolArray) -> BoolArray:
+        """Which points (N,) may live: those seen twice, once in the keyframe that has their patch."""
         seen, points = self.sightings, self.points
-        seen["on"][sightings] = False
-        on = seen["on"]
-        count = np.bincount(seen["point"][on], minlength=len(points))
         own = on & (seen["kf"] == points["source_kf"][seen["point"]])
         has_source = np.zeros(len(points), np.bool_)
         has_source[seen["point"][own]] = True
-        dead = np.flatnonzero(points["alive"] & ((count < 2) | ~has_source))
-        self.remove(dead)
-        return dead
-
-    def remove(self, points: Rowlike) -> None:
-        """Let points die, with all their sightings."""
-        alive = self.points["alive"]
-        alive[points] = False
-        seen = self.sightings
-        seen["on"][~alive[seen["point"]]] = False
-        self.version += 1
+        return super().lives(on) & has_source
 
     def change_camera(self, camera: Camera) -> None:
         """Take another camera; poses, points and sightings stay."""
-        self.camera = camera
+        super().change_camera(camera)
         self.points["slope"][:] = slopes(camera, self.points["source_uv"])
-        self.version += 1
 
-    def measured_in(self, kf: int) -> IntArray:
-        """Numbers of the points (n,) that a keyframe sees."""
-        seen = self.sightings
-        return np.asarray(seen["point"][(seen["kf"] == kf) & seen["on"]])
+    def greys(self, points: IntArray) -> Bytes:
+        """Grey levels of points (n,) in the pictures in which they were first seen."""
+        height, width = self.shape
+        u, v = np.rint(self.points["source_uv"][points]).astype(np.int64).T
+        kf = self.points["source_kf"][points]
+        return np.asarray(self.image(0)[kf, np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)])
 
     def snapshot(self) -> VisualMap:
         """Return the map as it is now, to be read while this one changes; images are shared."""
@@ -224,13 +193,13 @@ class VisualMap:
             self.camera,
             self.shape,
             self.levels,
-            self.keyframes.frozen(),
-            self.points.frozen(),
-            self.sightings.frozen(),
             list(self.corners),
             list(self.small),
-            self.version,
             [rows.shown() for rows in self._images],
+            keyframes=self.keyframes.frozen(),
+            points=self.points.frozen(),
+            sightings=self.sightings.frozen(),
+            version=self.version,
         )
 
 
@@ -247,20 +216,3 @@ def slopes(camera: Camera, uv: ArrayLike) -> Array:
     z = ray.bearing[..., 2, None, None]
     xn = ray.bearing[..., :2, None] / z
     return np.asarray((ray.J_pixel[..., :2, :] - xn * ray.J_pixel[..., 2:, :]) / z)
-
-
-def shared_points(visual_map: VisualMap, kf: int) -> IntArray:
-    """How many points each keyframe (K,) has in common with ``kf``; at ``kf``, how many that sees."""
-    seen = visual_map.sightings
-    in_kf = np.zeros(len(visual_map.points), np.bool_)
-    in_kf[visual_map.measured_in(kf)] = True
-    common = seen["on"] & in_kf[seen["point"]]
-    return np.bincount(seen["kf"][common], minlength=len(visual_map.keyframes))
-
-
-def neighbours(visual_map: VisualMap, kf: int, count: int) -> IntArray:
-    """Keyframes (at most ``count``) that share most points with ``kf``, most first; without ``kf`` itself."""
-    shared = shared_points(visual_map, kf)
-    shared[kf] = 0
-    order = np.argsort(-shared, kind="stable")[:count]
-    return np.asarray(order[shared[order] > 0])
