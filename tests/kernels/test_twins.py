@@ -27,7 +27,7 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.grids.static_dynamic import Layers, Rules
 
-from . import rows_bundle, rows_features, rows_pose, rows_rendered, rows_visual_map
+from . import rows_bundle, rows_features, rows_orb, rows_pose, rows_rendered, rows_visual_map
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 
@@ -172,6 +172,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "reduced:reduced_update_in_place": [for_reduced_update],
     **rows_bundle.ROWS,
     **rows_features.ROWS,
+    **rows_orb.ROWS,
     **rows_pose.ROWS,
     **rows_rendered.ROWS,
     **rows_visual_map.ROWS,

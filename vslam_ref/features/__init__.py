@@ -10,6 +10,8 @@ module              holds
 ``patch_search``    the corner that looks most like a template: ZMSSD or ZNCC
 ``refinement``      between the pixels: inverse compositional, with an offset of brightness
 ``following``       points from image to image, and back as a check
+``hamming``         binary descriptors: bits that differ, and pairs
+``orb``             corners of all scales with a direction and 256 bits each
 ``small_images``    a tiny blurred image, and how the camera turned between two of them
 ``book``            the same in plain loops, as chapter 08 reads it
 ==================  =================================================================================

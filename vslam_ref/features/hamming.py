@@ -1,0 +1,135 @@
+"""Binary descriptors compared: how many bits differ, and which belong together."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import IntArray
+from vslam_ref.features.levels import Bytes
+
+
+class Matches(NamedTuple):
+    """Pairs of descriptors.
+
+    Attributes
+    ----------
+    first, second : ndarray of int64, shape (k,)
+        Which of the first set belongs to which of the second; the first in ascending order.
+    distance : ndarray of int64, shape (k,)
+        Bits that differ.
+    """
+
+    first: IntArray
+    second: IntArray
+    distance: IntArray
+
+
+def descriptors(name: str, given: ArrayLike) -> Bytes:
+    """Check descriptors (n, bytes) that have no unit, and lay them out in rows.
+
+    Raises
+    ------
+    ValueError
+        If they are not bytes in rows.
+    """
+    array = np.asarray(given)
+    if array.dtype != np.uint8 or array.ndim != 2:
+        raise ValueError(f"{name} is {array.dtype} of shape {array.shape}: need uint8 of shape (n, bytes)")
+    return np.ascontiguousarray(array)
+
+
+def _both(a: ArrayLike, b: ArrayLike) -> tuple[Bytes, Bytes]:
+    first, second = descriptors("a", a), descriptors("b", b)
+    if first.shape[1] != second.shape[1]:
+        raise ValueError(f"a has {first.shape[1]} bytes each and b {second.shape[1]}: need as many")
+    return first, second
+
+
+def distances(a: ArrayLike, b: ArrayLike) -> IntArray:
+    """Count the bits in which each descriptor of a set differs from each one of another.
+
+    Implements :eq:`eq-hamming`.
+
+    Parameters
+    ----------
+    a : array_like of uint8, shape (n, bytes)
+    b : array_like of uint8, shape (m, bytes)
+
+    Returns
+    -------
+    ndarray of int32, shape (n, m)
+        Counts of bits: they have no unit.
+
+    Raises
+    ------
+    ValueError
+        If they are not bytes, or not as many.
+
+    Examples
+    --------
+    >>> distances(np.array([[0b1100]], np.uint8), np.array([[0b1010], [0b1100]], np.uint8))
+    array([[2, 0]], dtype=int32)
+    """
+    return _distances(*_both(a, b))
+
+
+@accelerated("hamming:distances")
+def _distances(a: Bytes, b: Bytes) -> IntArray:
+    """Bits (n, m): where a is set and b is not, and the other way round, as a product of matrices."""
+    p, q = (np.unpackbits(k, axis=1).astype(np.float32) for k in (a, b))
+    total = p.sum(1)[:, None] + q.sum(1) - 2 * (p @ q.T)  # eq-hamming: whole numbers, exact
+    bits: IntArray = total.astype(np.int32)
+    return bits
+
+
+def match(
+    a: ArrayLike, b: ArrayLike, ratio: float | None = 0.8, mutual: bool = True, limit: int = 256
+) -> Matches:
+    """Pair each descriptor of a set with its nearest one of another.
+
+    Implements :eq:`eq-hamming-match`.
+
+    Parameters
+    ----------
+    a : array_like of uint8, shape (n, bytes)
+    b : array_like of uint8, shape (m, bytes)
+    ratio : float, optional
+        The distance must be below so many times that of the second nearest; with 1, only ties are refused.
+        None does not ask.
+    mutual : bool
+        Whether a must be the nearest of b, too.  Of several that are equally near, the first is taken.
+    limit : int
+        Largest distance, bits.
+
+    Returns
+    -------
+    Matches
+
+    Raises
+    ------
+    ValueError
+        As :func:`distances`.
+
+    Examples
+    --------
+    >>> a = np.array([[0b0000], [0b1111]], np.uint8)
+    >>> match(a, np.array([[0b0111], [0b0001]], np.uint8)).second
+    array([1, 0])
+    """
+    d = distances(a, b)
+    rows = np.arange(len(d))
+    if d.size == 0:
+        none = np.zeros(0, np.int64)
+        return Matches(none, none, none)
+    second = d.argmin(1)
+    nearest = d[rows, second]
+    ok = nearest <= limit
+    if ratio is not None and d.shape[1] > 1:
+        ok &= nearest < ratio * np.partition(d, 1, axis=1)[:, 1]
+    if mutual:
+        ok &= d.argmin(0)[second] == rows
+    return Matches(rows[ok], second[ok], nearest[ok].astype(np.int64))  # eq-hamming-match

@@ -1,0 +1,108 @@
+"""Descriptors: 256 comparisons of two pixels in the smoothed picture, turned with the patch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vslam_ref._kernels import accelerated
+from vslam_ref.arrays import Array, IntArray, as_array
+from vslam_ref.features.fast import Pixels, pixels
+from vslam_ref.features.levels import Bytes, grey
+from vslam_ref.features.orb.candidates import BORDER
+from vslam_ref.features.orb.pair_table import PAIRS
+
+WEIGHTS = np.array([18, 34, 49, 54, 49, 34, 18])
+"""A Gaussian of two pixels on seven, as 256ths; the middle one takes what rounding left over."""
+
+
+def smooth(image: ArrayLike) -> Bytes:
+    """Smooth a picture by a Gaussian of two pixels; beyond its border it goes on as its mirror image.
+
+    Implements :eq:`eq-orb-smooth`.
+
+    Parameters
+    ----------
+    image : array_like of uint8, shape (H, W)
+        H and W at least 4.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W)
+
+    Raises
+    ------
+    ValueError
+        If the image is not grey with 8 bits, or smaller.
+
+    Examples
+    --------
+    >>> image = np.zeros((9, 9), np.uint8)
+    >>> image[4, 4] = 255
+    >>> smooth(image)[4]
+    array([ 0,  4,  7, 10, 11, 10,  7,  4,  0], dtype=uint8)
+    """
+    return _smooth(grey("image", image, 4))
+
+
+@accelerated("orb:smooth")
+def _smooth(image: Bytes) -> Bytes:
+    """Seven pixels along the rows, then down the columns: whole numbers, rounded half up."""
+    height, width = image.shape
+    wide = np.pad(image, 3, mode="reflect").astype(np.uint16)
+    rows = np.zeros((height + 6, width), np.uint16)
+    for k, w in enumerate(WEIGHTS):
+        rows += wide[:, k : k + width] * np.uint16(w)
+    total = np.full((height, width), 2**15, np.uint32)
+    for k, w in enumerate(WEIGHTS):
+        total += rows[k : k + height] * np.uint32(w)
+    smoothed: Bytes = (total >> 16).astype(np.uint8)  # eq-orb-smooth
+    return smoothed
+
+
+def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
+    """Describe patches of a smoothed picture by 256 comparisons.
+
+    Implements :eq:`eq-orb-test`.
+
+    Parameters
+    ----------
+    smoothed : array_like of uint8, shape (H, W)
+    xy : array_like of int, shape (n, 2)
+        Pixels (x, y), at least 19 from the border.
+    direction : array_like, shape (n, 2)
+        Unit vectors (cos, sin) of the patches' angles.
+
+    Returns
+    -------
+    ndarray of uint8, shape (n, 32)
+        Bit k of byte j is set if the first pixel of pair 8 j + k is darker than the second.
+
+    Raises
+    ------
+    ValueError
+        If the picture is not grey with 8 bits, a pixel is nearer to the border, or a number is missing.
+
+    Examples
+    --------
+    >>> describe(np.zeros((39, 39), np.uint8), [[19, 19]], [[1.0, 0.0]]).any()
+    np.False_
+    """
+    whole = grey("smoothed", smoothed)
+    at = pixels(xy, whole.shape, BORDER, BORDER)
+    unit = as_array("direction", direction, 2)
+    if unit.shape != at.shape:
+        raise ValueError(f"direction is of shape {unit.shape}: need {at.shape}, one for each pixel")
+    return _describe(whole.reshape(-1), whole.shape[1], at, unit, PAIRS)
+
+
+@accelerated("orb:describe")
+def _describe(flat: Bytes, width: int, xy: Pixels, direction: Array, pairs: IntArray) -> Bytes:
+    """Descriptors (n, len(pairs) / 8) in a picture in rows (H * width,); pairs (m, 4) are x, y, x, y."""
+    c, s = direction[:, 0, None, None], direction[:, 1, None, None]
+    x, y = pairs[:, 0::2], pairs[:, 1::2]  # (m, 2): of the first pixel and of the second
+    dx = np.rint(c * x - s * y).astype(np.int64)  # (n, m, 2) eq-orb-steer
+    dy = np.rint(s * x + c * y).astype(np.int64)
+    at = (xy[:, 1].astype(np.int64) * width + xy[:, 0])[:, None, None] + dy * width + dx
+    value = flat[at]
+    return np.packbits(value[..., 0] < value[..., 1], axis=1, bitorder="little")  # eq-orb-test
