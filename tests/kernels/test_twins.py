@@ -27,7 +27,7 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.grids.static_dynamic import Layers, Rules
 
-from . import rows_bundle, rows_features, rows_orb, rows_pose, rows_rendered, rows_visual_map
+from . import rows_bundle, rows_features, rows_orb, rows_orbslam, rows_pose, rows_rendered, rows_visual_map
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 
@@ -173,6 +173,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     **rows_bundle.ROWS,
     **rows_features.ROWS,
     **rows_orb.ROWS,
+    **rows_orbslam.ROWS,
     **rows_pose.ROWS,
     **rows_rendered.ROWS,
     **rows_visual_map.ROWS,

@@ -15,12 +15,13 @@ from vslam_ref.estimation.robust import tuned
 from vslam_ref.features import View, follow
 from vslam_ref.geometry import camera_pose, se3
 from vslam_ref.geometry.alignment import align
-from vslam_ref.systems.ptam import Settings, book, start
+from vslam_ref.systems.ptam import Settings, book
 from vslam_ref.systems.ptam.look import prepare, strong_corners
 from vslam_ref.systems.ptam.mapper import new_points
 from vslam_ref.systems.visual_map import VisualMap
 from vslam_ref.systems.visual_map import book as plain_maps
 from vslam_ref.systems.visual_map.adjusting import as_problem
+from vslam_ref.systems.visual_map.starting import missing
 from vslam_ref.worlds.rendered import scene
 
 from .conftest import Film, Run, run
@@ -110,7 +111,7 @@ def test_what_is_no_start() -> None:
         )
         parallax = np.concatenate([parallax, np.full(10, angle)])
         wide = int((parallax >= s.wide_parallax).sum())
-        told = start._missing(float(np.median(parallax)), wide, cost, s)
+        told = missing(float(np.median(parallax)), wide, cost, s)
         mine = book.missing(parallax.tolist(), cost, s)
         assert (told == "") == (mine == "")
         answers.append(mine)

@@ -17,7 +17,7 @@ from vslam_ref.datasets.sequences import read_camera
 from vslam_ref.experiments.visual_slam import overlay
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
-from vslam_ref.systems.ptam import refine_camera
+from vslam_ref.systems.visual_map import refine_camera
 from vslam_ref.worlds.rendered import scene
 from vslam_ref.worlds.rendered.record import Effects
 from vslam_ref.worlds.rendered.scenes import pinhole

@@ -13,7 +13,7 @@ from vslam_ref.experiments.visual_slam.paths import scale_drift, trajectory
 from vslam_ref.experiments.visual_slam.running import Run
 from vslam_ref.geometry import se3
 from vslam_ref.metrics.trajectory import absolute_error
-from vslam_ref.systems.ptam.refine_camera import RefinedCamera
+from vslam_ref.systems.visual_map.refine_camera import RefinedCamera
 
 CLEAR = 2.0
 """Standard deviations that a number of the camera must move, for the change to be more than noise."""

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
-from vslam_ref.systems.ptam.chosen import ChosenStart
 from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
 from vslam_ref.systems.ptam.trails import FIRST, Trails
+from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 
 UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
 STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)

@@ -9,23 +9,22 @@ module              holds
 ``look``            pyramid and corners of a picture
 ``trails``          before there is a map: corners followed from picture to picture
 ``start``           two pictures to a first map, or why not yet
-``chosen``          a start from two pictures that the user chose
+``chosen``          trails from one picture that the user chose to the other
 ``tracker``         the pose of every picture
 ``policy``          which pictures become keyframes
 ``mapper``          what happens to these
 ``concurrent``      the same with the mapper in a thread of its own
-``refine_camera``   the camera freed in the last adjustment
 ==================  ==============================================================================
 
 A system takes pictures; it opens no files and draws nothing.
 """
 
-from vslam_ref.systems.ptam.chosen import ChosenStart
 from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
 from vslam_ref.systems.ptam.ptam import STAGES, PictureOutcome, Pose, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
+from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 
 KERNELS = (
     "bundle", "bundle_schur", "curves", "features", "looking", "patches", "points", "pose", "visibility",

@@ -31,13 +31,13 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import se3
 from vslam_ref.support.stopwatch import Stopwatch
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, map_keyframe
-from vslam_ref.systems.ptam.ptam import PictureOutcome, Pose, Ptam, nearest_keyframe
+from vslam_ref.systems.ptam.ptam import PictureOutcome, Pose, Ptam
 from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.ptam.start import Attempt
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.recover import Known
 from vslam_ref.systems.ptam.tracker.tracker import Tracked
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
+from vslam_ref.systems.visual_map.telling import Attempt, nearest_keyframe
 
 
 class Handed(NamedTuple):
@@ -229,7 +229,7 @@ class ConcurrentPtam(Ptam):
     def _carry_over(self, before: VisualMap, now: VisualMap) -> None:
         """Move the tracker's last pose with its reference keyframe, and make room for new points."""
         assert self.tracker is not None
-        kf = nearest_keyframe(before, self.tracker.T_last)
+        kf = nearest_keyframe(before.T_kf_world, self.tracker.T_last)
         T_cam_kf = se3.compose(self.tracker.T_last, se3.inverse(before.T_kf_world[kf]))
         self.tracker.T_last = se3.compose(T_cam_kf, now.T_kf_world[kf])
         more = np.zeros(len(now.points) - len(self.tried), np.int64)

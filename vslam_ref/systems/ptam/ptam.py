@@ -10,30 +10,38 @@ In this order, one after the other, on one thread: the same pictures and seed gi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, IntArray
-from vslam_ref.geometry import camera_pose, se3
+from vslam_ref.geometry import se3
 from vslam_ref.geometry.camera_pose import DecayingVelocity
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.support.stopwatch import Stopwatch, stage
 from vslam_ref.systems.ptam import trails as trail_steps
-from vslam_ref.systems.ptam.chosen import ChosenStart
+from vslam_ref.systems.ptam.chosen import ChosenSteps
 from vslam_ref.systems.ptam.look import prepare
-from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe
+from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, adjust_all, map_keyframe, robust
 from vslam_ref.systems.ptam.policy import KeyframePolicy
-from vslam_ref.systems.ptam.refine_camera import RefinedCamera, refine_camera
 from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.ptam.start import Attempt, attempt, first_map
+from vslam_ref.systems.ptam.start import attempt, first_map
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.tracker import Tracked, Tracker
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
+from vslam_ref.systems.visual_map.chosen_start import ChosenStart
+from vslam_ref.systems.visual_map.refine_camera import RefinedCamera, refine_camera
+from vslam_ref.systems.visual_map.telling import (
+    Attempt,
+    PictureOutcome,
+    Pose,
+    Trail,
+    nearest_keyframe,
+    path_of,
+)
+
+__all__ = ["STAGES", "PictureOutcome", "Pose", "Ptam"]
 
 STAGES = (
     "prepare",
@@ -52,44 +60,6 @@ STAGES = (
 )
 """Of a step, in their order: pyramid and corners; before there is a map; guesses by the small image; both
 passes without their poses, and these; without a guess; then the mapper's, and what is left."""
-
-
-class Pose(NamedTuple):
-    """Pose relative to a keyframe, ``T_cam_kf (4, 4)``, and ``live (4, 4)`` as told then; own unit."""
-
-    number: int
-    kf: int
-    T_cam_kf: Array
-    live: Array | None
-
-
-class PictureOutcome(NamedTuple):
-    """What became of one picture.
-
-    Attributes
-    ----------
-    number : int
-    tracked : Tracked or None
-        None before there is a map.
-    mapped : MappedKeyframe or None
-        If it became a keyframe.
-    attempt : Attempt or str or None
-        Of a start, if one was tried; a sentence where there was nothing to try.
-    waiting : str
-        Why no start was even tried; empty where one was, or where there is a map.
-    queued : bool
-        Whether it was handed to a mapper in another thread, to become a keyframe.
-    stages : mapping of str to float
-        CPU time of the thread, seconds, by ``STAGES`` that had a part in it; together the whole step.
-    """
-
-    number: int
-    tracked: Tracked | None = None
-    mapped: MappedKeyframe | None = None
-    attempt: Attempt | str | None = None
-    waiting: str = ""
-    queued: bool = False
-    stages: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass
@@ -180,7 +150,8 @@ class Ptam:
 
     def _towards(self, chosen: ChosenStart, picture: PreparedPicture) -> PictureOutcome:
         """Go on towards a start from two chosen pictures."""
-        self.trails, told = chosen.take(self.trails, picture, self.camera, self.settings, self.rng)
+        steps = ChosenSteps(self.camera, self.settings, self.rng)
+        self.trails, told = chosen.take(steps, self.trails, picture)
         if told.attempt is not None and not told.reason:
             self._start(told.attempt)
         return PictureOutcome(picture.number, attempt=told.attempt or told.reason or None)
@@ -230,7 +201,7 @@ class Ptam:
     def _note(self, visual_map: VisualMap, picture: PreparedPicture, tracked: Tracked, *, live: bool) -> None:
         """Remember a pose relative to the keyframe nearest to it."""
         T = tracked.T_cam_world
-        kf = nearest_keyframe(visual_map, T)
+        kf = nearest_keyframe(visual_map.T_kf_world, T)
         T_cam_kf = se3.compose(T, se3.inverse(visual_map.T_kf_world[kf]))
         self.poses[picture.number] = Pose(picture.number, kf, T_cam_kf, T if live else None)
 
@@ -254,22 +225,18 @@ class Ptam:
             return
         adjust_all(self.map, self.settings, self.settings.last_steps)
         if self.settings.camera.refine:
-            self.refined = refine_camera(self.map, self.settings)
+            self.refined = refine_camera(self.map, robust(self.settings), self.settings.camera)
 
     def close(self) -> None:
         """Leave nothing running; here there is nothing."""
 
     def trajectory(self) -> tuple[Array, Array]:
         """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""
-        if self.map is None:
-            return np.zeros(0, np.int64), np.zeros((0, 4, 4))
-        numbers = np.array(sorted(self.poses))
-        each = [self.poses[int(n)] for n in numbers]
-        T = np.stack([se3.compose(p.T_cam_kf, self.map.T_kf_world[p.kf]) for p in each])
-        return numbers, T
+        return path_of(self.poses, np.zeros((0, 4, 4)) if self.map is None else self.map.T_kf_world)
 
-
-def nearest_keyframe(visual_map: VisualMap, T_cam_world: Array) -> int:
-    """Number of the keyframe nearest to a pose (4, 4), by the centres in the map's own unit."""
-    centres = camera_pose.centre_from_pose(visual_map.T_kf_world)
-    return int(np.argmin(np.linalg.norm(centres - camera_pose.centre_from_pose(T_cam_world), axis=1)))
+    def trail(self) -> Trail | None:
+        """Points that are followed before there is a map; None without any."""
+        trails = self.trails
+        if trails is None or (self.chosen is None and len(trails.pictures) < 2):
+            return None
+        return Trail(trails.now, trails.level, trails.first)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from vslam_ref.support.config import assume, settings
 from vslam_ref.systems.visual_map import Looks
+from vslam_ref.systems.visual_map.refine_camera import CameraSettings
 
 
 @dataclass(frozen=True)
@@ -138,19 +139,6 @@ class MapperSettings:
     )
     tries: int = assume(8, "looks", "after which a point must have been found often enough")
     found: float = assume(0.25, "share", "fewer: the point dies")
-
-
-@dataclass(frozen=True)
-class CameraSettings:
-    """Self-calibration at the end; every field has its own unit, beside it."""
-
-    refine: bool = assume(False, "", "the camera that was given is believed; the last adjustment may free it")
-    most_shift: float = assume(
-        5.0,
-        "px",
-        "an intrinsic whose standard deviation moves a pixel farther stays; a dozen times the floor of sigma",
-    )
-    steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
 
 
 AT_LEAST_ONE = {

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from enum import Enum
-
 import numpy as np
 
 from vslam_ref.systems.ptam.settings import TrackerSettings
 from vslam_ref.systems.ptam.tracker.coarse_fine import Pass
+from vslam_ref.systems.visual_map.telling import Quality
 
-
-class Quality(Enum):
-    """How well a picture was tracked."""
-
-    GOOD = "good"
-    POOR = "poor"
-    LOST = "lost"
+__all__ = ["Quality", "found_per_level", "quality"]
 
 
 def quality(fine: Pass, settings: TrackerSettings) -> Quality:

@@ -6,16 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.estimation.three_point_pose import AgreedPose, pose_by_three_points
 from vslam_ref.features import View, finest_from_level, follow, level_from_finest, level_sigma
 from vslam_ref.geometry.cameras import Camera
-from vslam_ref.geometry.drawing import different_numbers
-from vslam_ref.geometry.multiview.three_points import p3p
 from vslam_ref.systems.visual_map import PreparedPicture, VisualMap
-
-DRAWS = 200
-LIMIT_PX = 3.0
-"""Pixels of level 0, times 2^level: a followed patch farther off counts as wrong."""
 
 
 class Known(NamedTuple):
@@ -24,13 +19,6 @@ class Known(NamedTuple):
     point: IntArray
     uv: Array
     level: IntArray
-
-
-class Agreed(NamedTuple):
-    """Best T_cam_world (4, 4), metres, of many draws, and ok (n,): which matches agree with it."""
-
-    T_cam_world: Array
-    ok: BoolArray
 
 
 def follow_known(before: PreparedPicture, now: PreparedPicture, known: Known, radius: float) -> Known:
@@ -52,28 +40,10 @@ def follow_known(before: PreparedPicture, now: PreparedPicture, known: Known, ra
 
 
 def by_three_points(
-    camera: Camera, X_world: Array, known: Known, rng: np.random.Generator, draws: int = DRAWS
-) -> Agreed | None:
-    """Pose from three matches with which most of all agree; None if fewer than eight do.
-
-    Implements :eq:`eq-recover-cost`, the least of many draws of three; ``X_world`` is (n, 3), metres.
-    """
-    rays = camera.unproject(known.uv)
-    use = np.flatnonzero(rays.valid)
-    if len(use) < 8:
-        return None
-    sample = use[different_numbers(rng, draws, len(use), 3)]
-    found = p3p(rays.bearing[sample], X_world[sample])
-    T = found.T_cam_world[found.valid]
-    if len(T) == 0:
-        return None
-    at = camera.pixel_from_world(T[:, None], X_world[None])
-    limit = LIMIT_PX * level_sigma(known.level)
-    error = np.where(at.valid, np.hypot(*np.moveaxis(at.uv - known.uv, -1, 0)) / limit, np.inf)
-    cost = np.minimum(error**2, 1.0).sum(1)
-    best = int(np.argmin(cost))
-    ok = error[best] < 1.0
-    return Agreed(T[best], ok) if np.count_nonzero(ok) >= 8 else None
+    camera: Camera, X_world: Array, known: Known, rng: np.random.Generator
+) -> AgreedPose | None:
+    """Pose from three followed points (n, 3) with which most of all agree, the map's own unit; None without."""
+    return pose_by_three_points(camera, X_world, known.uv, rng, sigma_px=level_sigma(known.level))
 
 
 def known_in(visual_map: VisualMap, kf: int) -> Known:

@@ -19,6 +19,7 @@ from vslam_ref.systems.ptam.tracker import recover
 from vslam_ref.systems.ptam.tracker.coarse_fine import Pass, coarse, fine
 from vslam_ref.systems.ptam.tracker.quality import Quality, quality
 from vslam_ref.systems.visual_map import PreparedPicture, Visible, VisualMap
+from vslam_ref.systems.visual_map.telling import Told
 
 
 class Tracked(NamedTuple):
@@ -44,6 +45,13 @@ class Tracked(NamedTuple):
     def pose(self) -> TrackedPose:
         """Of the fine pass."""
         return self.fine.pose
+
+    def told(self) -> Told:
+        """The same in a few words."""
+        fine = self.fine
+        held = fine.weights > 0
+        tried, at = len(fine.seen.point), fine.seen.level[held]
+        return Told(self.quality, self.way, tried, fine.uv[held], at, float(self.pose.sigma))
 
 
 @dataclass

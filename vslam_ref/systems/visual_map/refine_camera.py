@@ -15,20 +15,34 @@ What is refused has the value that was given.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vslam_ref.arrays import Array
-from vslam_ref.estimation.bundle import Options
+from vslam_ref.estimation.bundle import Options, Robust
 from vslam_ref.estimation.bundle.self_calibration import Refused
 from vslam_ref.geometry.cameras import Camera, Pinhole, Radtan
 from vslam_ref.geometry.cameras.images import pixel_grid
-from vslam_ref.systems.ptam.mapper.mapper import robust
-from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.visual_map import VisualMap, adjust_with_camera
+from vslam_ref.support.config import assume
+from vslam_ref.systems.visual_map.adjusting import adjust_with_camera
+from vslam_ref.systems.visual_map.keyframe_map import KeyframeMap
 
 LENS_TERMS = ("k1", "k2", "p1", "p2")
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """Self-calibration at the end; every field has its own unit, beside it."""
+
+    refine: bool = assume(False, "", "the camera that was given is believed; the last adjustment may free it")
+    most_shift: float = assume(
+        5.0,
+        "px",
+        "an intrinsic whose standard deviation moves a pixel farther stays; a dozen times the floor of sigma",
+    )
+    steps: int = assume(100, "", "of an adjustment with the camera: along its valleys progress is slow")
 
 
 class PixelShift(NamedTuple):
@@ -66,15 +80,15 @@ class RefinedCamera(NamedTuple):
     T_kf_before: Array
 
 
-def refine_camera(visual_map: VisualMap, settings: Settings) -> RefinedCamera:
+def refine_camera(visual_map: KeyframeMap, loss: Robust, s: CameraSettings) -> RefinedCamera:
     """Adjust everything with the camera free; the map is changed in place."""
-    given, before, s = visual_map.camera, visual_map.T_kf_world.copy(), settings.camera
-    if len(visual_map.keyframes) < 3:
+    given, before = visual_map.camera, visual_map.T_kf_world.copy()
+    if len(visual_map.used_keyframes()) < 3:
         nothing = "two keyframes determine no camera"
         return RefinedCamera(given, given, {}, {}, nothing, PixelShift(0.0, 0.0), before)
     start, names = with_lens_terms(given), free_names(given)
     found = adjust_with_camera(
-        visual_map, start, names, robust(settings), most_shift_px=s.most_shift, options=options(s.steps)
+        visual_map, start, names, loss, most_shift_px=s.most_shift, options=options(s.steps)
     )
     camera = without_lens_terms(given, visual_map.camera, found.refused)
     if camera is not visual_map.camera:
