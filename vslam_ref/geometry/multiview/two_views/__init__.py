@@ -6,12 +6,14 @@ module                  holds
 ``book``                the algorithms for one pair of pictures, to be read
 ``eight_point``         ``linear_essential``, ``linear_fundamental``, ``nearest_essential``
 ``five_point``          ``five_point_essentials``: all essential matrices of many samples of five
+``seven_point``         ``seven_point_fundamentals``: one or three of seven pairs, without a camera
 ``homography``          ``fit_homography``, ``apply_homography``, ``plane_homography``
 ``decompose``           ``essential_motions`` (four), ``homography_motions`` (two, with normals)
 ``sampson_distance``    signed distances: ``sampson``, ``sampson_with_jacobians`` of a relative pose and its
                         five numbers, ``perturb``, ``essential_sampson``, ``homography_sampson``
 ``in_front``            ``cheirality``: squared distance of a pair from the nearest point in front; ``depths``
-``consensus``           ``essential_consensus``, ``homography_consensus``: samples, MSAC, adaptive ``Draws``
+``consensus``           ``essential_consensus``, ``fundamental_consensus``, ``homography_consensus``: samples,
+                        MSAC, adaptive ``Draws``
 ``choice``              ``choose``: the cheapest of several motions, its rivals, or why it is refused
 ``degenerate``          ``degeneracy``: no parallax, pure rotation, a plane, or none of them
 ======================  ===========================================================================
@@ -39,6 +41,7 @@ from vslam_ref.geometry.multiview.two_views.consensus import (
     Draws,
     draws_needed,
     essential_consensus,
+    fundamental_consensus,
     homography_consensus,
     truncated_cost,
 )
@@ -76,6 +79,7 @@ from vslam_ref.geometry.multiview.two_views.sampson_distance import (
     sampson,
     sampson_with_jacobians,
 )
+from vslam_ref.geometry.multiview.two_views.seven_point import SevenPointMatrices, seven_point_fundamentals
 
 __all__ = [
     "Cheirality",
@@ -87,6 +91,7 @@ __all__ = [
     "LinearEssential",
     "PlanarMotions",
     "SampsonJacobians",
+    "SevenPointMatrices",
     "Verdict",
     "apart",
     "apply_homography",
@@ -101,6 +106,7 @@ __all__ = [
     "essential_sampson",
     "fit_homography",
     "five_point_essentials",
+    "fundamental_consensus",
     "homography_consensus",
     "homography_motions",
     "homography_sampson",
@@ -112,6 +118,7 @@ __all__ = [
     "plane_homography",
     "sampson",
     "sampson_with_jacobians",
+    "seven_point_fundamentals",
     "torr_criterion",
     "truncated_cost",
 ]

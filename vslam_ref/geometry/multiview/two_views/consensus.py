@@ -30,10 +30,11 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.geometry.drawing import different_numbers
 from vslam_ref.geometry.multiview.two_views._pairs import checked_pairs, checked_sigma
-from vslam_ref.geometry.multiview.two_views.eight_point import linear_essential
+from vslam_ref.geometry.multiview.two_views.eight_point import linear_essential, linear_fundamental
 from vslam_ref.geometry.multiview.two_views.five_point import five_point_essentials
 from vslam_ref.geometry.multiview.two_views.homography import fit_homography
 from vslam_ref.geometry.multiview.two_views.sampson_distance import essential_sampson, homography_squared
+from vslam_ref.geometry.multiview.two_views.seven_point import seven_point_fundamentals
 
 ONE_EQUATION, TWO_EQUATIONS = 3.841458820694124, 5.991464547107979
 """What chi-square of one and of two degrees of freedom stays below with probability 0.95."""
@@ -77,7 +78,7 @@ class Consensus:
     Attributes
     ----------
     model : ndarray, shape (3, 3)
-        E or H; zero where there is none.
+        E, F or H; zero where there is none.
     inliers : ndarray of bool, shape (N,)
         Pairs whose squared distance is below the threshold.
     cost : float
@@ -143,6 +144,34 @@ def essential_consensus(
         return linear_essential(good_a, good_b).E
 
     kind = _Kind(5, 8, ONE_EQUATION, models, refit, _squared_E)
+    return _consensus(a, b, rng, checked_sigma(sigma), draws or Draws(), kind)
+
+
+def fundamental_consensus(
+    uv_a: ArrayLike, uv_b: ArrayLike, rng: np.random.Generator, *, sigma: float, draws: Draws | None = None
+) -> Consensus:
+    """Fundamental matrix of pairs of which many may be wrong, from samples of seven: no camera is known.
+
+    Implements :eq:`eq-msac` and :eq:`eq-draws`.  Parameters (``uv_a (N, 2)``, ``uv_b (N, 2)`` and ``sigma``,
+    pixels), returns and errors as for :func:`essential_consensus`.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> X = rng.uniform(-1, 1, (40, 3)) + [0, 0, 4]
+    >>> a, b = 500 * X[:, :2] / X[:, 2:], 500 * (X[:, :2] - [1, 0]) / X[:, 2:]
+    >>> b[:12] = rng.uniform(-200, 200, (12, 2))  # wrong matches
+    >>> found = fundamental_consensus(a, b, rng, sigma=0.5)
+    >>> bool(found.inliers[12:].all()), found.reason
+    (True, '')
+    """
+    a, b = checked_pairs(uv_a, uv_b)
+
+    def models(sample_a: Array, sample_b: Array) -> Array:
+        found = seven_point_fundamentals(sample_a, sample_b)
+        return found.F[found.valid]
+
+    kind = _Kind(7, 8, ONE_EQUATION, models, linear_fundamental, _squared_E)
     return _consensus(a, b, rng, checked_sigma(sigma), draws or Draws(), kind)
 
 

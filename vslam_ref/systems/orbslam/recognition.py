@@ -1,0 +1,287 @@
+"""Is this a place that was seen before?  Words propose, geometry decides, the picture before is asked.
+
+::
+
+    query of the inverted index            pictures that share words, none of the last few
+      enough common words, score           against that of the picture before: how alike two of one place are
+      groups of neighbours                 a place is seen by several pictures: their scores add up
+    for each of the best groups' best picture
+      pairs under common nodes             nearest, by far, mutual, turned alike
+      fundamental matrix                   inliers of the epipolar geometry
+    many inliers, or fewer and the picture before recognised a place near this one
+
+Two look-alikes share words, and even geometry: one door has as many inliers in two pictures of different
+places as in two of one.  So the numbers of inliers asked for were chosen on rendered look-alikes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features.vocabulary import (
+    Bag,
+    Database,
+    Found,
+    Matching,
+    Vocabulary,
+    bag,
+    descend,
+    match,
+    nodes_at_level,
+    score,
+    turned_alike,
+)
+from vslam_ref.geometry.multiview.two_views import Draws, fundamental_consensus
+
+
+@dataclass(frozen=True)
+class RecognitionSettings:
+    """How places are recognised.
+
+    Parameters
+    ----------
+    gap : int
+        The last pictures so many, which show the place anyway, are no candidates.
+    relative : float
+        Least score of a candidate, as a share of the score with the picture before.
+    common : float
+        Least number of common words, as a share of the candidate's that has most.
+    reach : int
+        Pictures so far before and after one are its neighbours.
+    group : float
+        Groups with less than this share of the best group's score are left out.
+    candidates : int
+        Most groups that are verified.
+    level : int
+        Of the nodes under which pairs are looked for; 0 is all with all.
+    matching : Matching
+    pixels : float
+        Farthest that a pair lies from the epipolar geometry, Sampson's distance, pixels.
+    sure : int
+        Inliers that are enough alone.
+    likely : int
+        Inliers that are enough if the picture before has as many with a place near this one.
+    near : int
+        How many pictures apart places are near.
+    draws : Draws
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+    """
+
+    gap: int = 8
+    relative: float = 0.3
+    common: float = 0.5
+    reach: int = 2
+    group: float = 0.5
+    candidates: int = 5
+    level: int = 1
+    matching: Matching = field(default_factory=Matching)
+    pixels: float = 3.0
+    sure: int = 25
+    likely: int = 18
+    near: int = 3
+    draws: Draws = field(default_factory=lambda: Draws(confidence=0.99, least=300, most=1000, batch=100))
+
+    def __post_init__(self) -> None:
+        """Refuse settings that mean nothing."""
+        shares = (self.relative, self.common, self.group)
+        counts = (self.gap, self.reach, self.level, self.near)
+        if not all(0.0 <= share <= 1.0 for share in shares) or min(counts) < 0 or self.candidates < 1:
+            raise ValueError(f"{self}: need shares from 0 to 1, counts of at least 0, and a candidate")
+        if not (self.pixels > 0 and 7 < self.likely <= self.sure):
+            raise ValueError(f"pixels {self.pixels}, {self.likely}, {self.sure}: need 7 < likely <= sure")
+
+
+class Picture(NamedTuple):
+    """Features of a picture, and their words.
+
+    Attributes
+    ----------
+    uv : ndarray, shape (N, 2)
+        Pixels of a lens without distortion.
+    angle : ndarray, shape (N,)
+        Radians.
+    descriptor : ndarray of uint8, shape (N, 32)
+    node : ndarray of int, shape (N,)
+        Node of each on the level of the direct index.
+    bag : Bag
+    """
+
+    uv: Array
+    angle: Array
+    descriptor: NDArray[np.uint8]
+    node: IntArray
+    bag: Bag
+
+
+class Verified(NamedTuple):
+    """Pairs of two pictures that one epipolar geometry explains.
+
+    Attributes
+    ----------
+    entry : int
+        The other picture; -1 for none.
+    first, second : ndarray of int, shape (m,)
+        Features of the picture and of the other one.
+    """
+
+    entry: int
+    first: IntArray
+    second: IntArray
+
+    @property
+    def inliers(self) -> int:
+        """How many pairs there are."""
+        return len(self.first)
+
+
+class Recognition(NamedTuple):
+    """What was recognised in a picture.
+
+    Attributes
+    ----------
+    entry : int
+        The picture of the same place; -1 for none.
+    best : Verified
+        The candidate with most inliers, accepted or not.
+    candidates : ndarray of int, shape (m,)
+        Pictures that were verified, the best group first.
+    """
+
+    entry: int
+    best: Verified
+    candidates: IntArray
+
+
+NOTHING = Verified(-1, np.zeros(0, np.int64), np.zeros(0, np.int64))
+
+
+def described(
+    vocabulary: Vocabulary, uv: Array, angle: Array, descriptor: NDArray[np.uint8], level: int
+) -> Picture:
+    """Give features ``uv (N, 2)``, pixels, with ``angle (N,)``, radians, and ``descriptor (N, 32)`` words."""
+    leaf = descend(vocabulary, descriptor).node
+    seen = bag(vocabulary, vocabulary.word[leaf])
+    return Picture(uv, angle, descriptor, nodes_at_level(vocabulary, leaf, level), seen)
+
+
+def proposed(
+    index: Database, query: Bag, least: float, allowed: NDArray[np.bool_], settings: RecognitionSettings
+) -> Found:
+    """Candidates of a picture: of each of the best groups of neighbours the best picture.
+
+    Parameters
+    ----------
+    index : Database
+        Pictures in the order in which they were seen.
+    query : Bag
+    least : float
+        Score below which a picture is no candidate; no unit.
+    allowed : ndarray of bool, shape (entries,)
+        Pictures that may be candidates; no unit.
+    settings : RecognitionSettings
+
+    Returns
+    -------
+    Found
+        Scores are those of the groups, growing no more.
+    """
+    found = index.query(query, allowed)
+    if len(found.entry) == 0:
+        return found
+    good = (found.common >= settings.common * found.common.max()) & (found.score >= least)
+    score_of, total = np.zeros(len(index)), np.zeros(len(index))
+    score_of[found.entry[good]] = found.score[good]
+    for shift in range(-settings.reach, settings.reach + 1):
+        total[max(shift, 0) : len(total) + min(shift, 0)] += score_of[max(-shift, 0) : len(total) - max(shift, 0)]
+    total[score_of == 0] = 0.0
+    chosen: list[int] = []
+    most = total.max(initial=0.0)
+    for entry in np.argsort(-total, kind="stable").tolist():
+        if len(chosen) == settings.candidates or total[entry] < max(settings.group * most, 1e-12):
+            break
+        around = slice(max(entry - settings.reach, 0), entry + settings.reach + 1)
+        best = int(np.argmax(score_of[around])) + around.start
+        if best not in chosen:
+            chosen.append(best)
+    common = np.zeros(len(index), np.int64)
+    common[found.entry] = found.common
+    at = np.array(chosen, np.int64)
+    return Found(at, total[at], common[at])
+
+
+def verified(
+    a: Picture, b: Picture, entry: int, rng: np.random.Generator, settings: RecognitionSettings
+) -> Verified:
+    """Pairs of two pictures that agree on an epipolar geometry; no camera is needed."""
+    pairs = match(a.descriptor, b.descriptor, a.node, b.node, settings.matching)
+    alike = turned_alike(a.angle[pairs.first], b.angle[pairs.second], settings.matching)
+    first, second = pairs.first[alike], pairs.second[alike]
+    if len(first) <= 7:
+        return NOTHING
+    sigma = settings.pixels / 1.959963984540054  # so that the consensus counts pairs up to ``pixels``
+    found = fundamental_consensus(a.uv[first], b.uv[second], rng, sigma=sigma, draws=settings.draws)
+    if found.reason:
+        return NOTHING
+    return Verified(entry, first[found.inliers], second[found.inliers])
+
+
+class Recogniser:
+    """Pictures one after the other: each is compared with those before, and becomes one of them.
+
+    Parameters
+    ----------
+    vocabulary : Vocabulary
+    rng : numpy.random.Generator
+        Draws the samples of the geometry.
+    settings : RecognitionSettings, optional
+    """
+
+    def __init__(
+        self, vocabulary: Vocabulary, rng: np.random.Generator, settings: RecognitionSettings | None = None
+    ) -> None:
+        self.vocabulary, self.rng = vocabulary, rng
+        self.settings = settings or RecognitionSettings()
+        self.index = Database(vocabulary.words)
+        self.pictures: list[Picture] = []
+        self._before = NOTHING
+
+    def see(self, uv: Array, angle: Array, descriptor: NDArray[np.uint8]) -> Recognition:
+        """Recognise a picture by its features, and remember it.
+
+        Parameters
+        ----------
+        uv : ndarray, shape (N, 2)
+            Pixels of a lens without distortion.
+        angle : ndarray, shape (N,)
+            Radians.
+        descriptor : ndarray of uint8, shape (N, 32)
+
+        Returns
+        -------
+        Recognition
+        """
+        how = self.settings
+        now = described(self.vocabulary, uv, angle, descriptor, how.level)
+        allowed = np.arange(len(self.pictures)) < len(self.pictures) - how.gap
+        least = how.relative * score(now.bag, self.pictures[-1].bag) if self.pictures else 0.0
+        candidates = proposed(self.index, now.bag, least, allowed, how).entry
+        best = NOTHING
+        for entry in candidates.tolist():
+            one = verified(now, self.pictures[entry], entry, self.rng, how)
+            best = one if one.inliers > best.inliers else best
+        agreed = min(best.inliers, self._before.inliers) >= how.likely
+        agreed &= abs(best.entry - self._before.entry) <= how.near
+        accepted = best.inliers >= how.sure or agreed
+        self._before = best
+        self.index.add(now.bag)
+        self.pictures.append(now)
+        return Recognition(best.entry if accepted else -1, best, candidates)
