@@ -25,6 +25,8 @@ from vslam_ref.estimation.similarity.matches import (
     agreeing,
     both_images,
     both_images_with_jacobians,
+    distance_ratio,
+    distance_ratio_with_jacobians,
     squared,
 )
 
@@ -37,6 +39,8 @@ __all__ = [
     "book",
     "both_images",
     "both_images_with_jacobians",
+    "distance_ratio",
+    "distance_ratio_with_jacobians",
     "estimate_similarity",
     "refine_similarity",
     "squared",

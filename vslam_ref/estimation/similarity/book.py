@@ -7,7 +7,8 @@
         s = sum q_k . R p_k / sum |p_k|^2;  t = mean Y - s R mean X
         cost = sum over all matches of min(|r_b|^2, c^2) + min(|r_a|^2, c^2)
     keep the cheapest; keep the matches with both errors below c
-    S <- Exp(delta) S with J'J delta = -J'r, until delta is nothing
+    errors of a match: r_b, r_a, and the log-ratio of both distances from b over its spread
+    S <- Exp(delta) S with J'W J delta = -J'W r, W Huber's weights, until delta is nothing
 
 The fast form decomposes instead (Umeyama), and damps.  A test asserts that both agree.
 """
@@ -69,11 +70,22 @@ def agrees(S: Array, m: PointMatches, c2: float, j: int) -> bool:
     return at is not None and all(float(r @ r) <= c2 for r in at)
 
 
-def gauss_newton(S: Array, m: PointMatches, members: list[int], steps: int = 20) -> Array:
-    """Similarity (4, 4) with the smallest sum of both squared errors of some matches, in sigma^2.
+def spread(S: Array, m: PointMatches, members: list[int]) -> float:
+    """Standard deviation of the log-ratios of distances for a similarity (4, 4): a ratio, 0.01 at least.
 
-    Implements :eq:`eq-squares`.
+    Implements :eq:`eq-mad`.
     """
+    d = [math.log(float(np.linalg.norm(sim3.act(S, m.X_a[j])) / np.linalg.norm(m.X_b[j]))) for j in members]
+    middle = sorted(abs(one - float(np.median(d))) for one in d)
+    return max(float(np.median(middle)) / 0.6744897501960817, 0.01)
+
+
+def gauss_newton(S: Array, m: PointMatches, members: list[int], c: float, steps: int = 200) -> Array:
+    """Similarity (4, 4) with the smallest sum of Huber's loss of all errors of some matches, in sigmas.
+
+    Implements :eq:`eq-squares` and :eq:`eq-reweighted`.
+    """
+    sigma_d = spread(S, m, members)
     for _ in range(steps):
         H, g = np.zeros((7, 7)), np.zeros(7)
         back = sim3.inverse(S)
@@ -84,10 +96,18 @@ def gauss_newton(S: Array, m: PointMatches, members: list[int], steps: int = 20)
             Y, X_b = sim3.act(S, m.X_a[j]), m.X_b[j]
             h_b = m.camera.project_with_jacobians(Y).J_point / m.sigma_b[j]
             h_a = m.camera.project_with_jacobians(sim3.act(back, X_b)).J_point / m.sigma_a[j]
-            J_b = h_b @ np.column_stack([np.eye(3), -so3.hat(Y), Y])
-            J_a = -h_a @ back[:3, :3] @ np.column_stack([np.eye(3), -so3.hat(X_b), X_b])
-            H += J_b.T @ J_b + J_a.T @ J_a
-            g += J_b.T @ at[0] + J_a.T @ at[1]
+            d = math.log(float(np.linalg.norm(Y) / np.linalg.norm(X_b))) / sigma_d
+            J = np.vstack(
+                [
+                    h_b @ np.column_stack([np.eye(3), -so3.hat(Y), Y]),
+                    -h_a @ back[:3, :3] @ np.column_stack([np.eye(3), -so3.hat(X_b), X_b]),
+                    np.array([*(Y / (Y @ Y)), 0.0, 0.0, 0.0, 1.0]) / sigma_d,
+                ]
+            )
+            r = np.array([*at[0], *at[1], d])
+            w = np.array([min(1.0, c / max(abs(one), 1e-300)) for one in r])  # eq-reweighted
+            H += J.T @ (w[:, None] * J)
+            g += J.T @ (w * r)
         delta = np.linalg.solve(H, -g)
         S = sim3.compose(sim3.exp(delta), S)
         if np.abs(delta).max() < 1e-13:
@@ -95,7 +115,7 @@ def gauss_newton(S: Array, m: PointMatches, members: list[int], steps: int = 20)
     return S
 
 
-def similarity(m: PointMatches, triples: IntArray, c2: float) -> tuple[Array, Array, list[int]]:
+def similarity(m: PointMatches, triples: IntArray, c2: float, c: float) -> tuple[Array, Array, list[int]]:
     """Best sample S (4, 4), the refined one, and the matches that agree with the sample, by number.
 
     Parameters
@@ -105,8 +125,10 @@ def similarity(m: PointMatches, triples: IntArray, c2: float) -> tuple[Array, Ar
         Samples, none of them degenerate.
     c2 : float
         Limit of a squared error, sigma^2.
+    c : float
+        Huber's constant, sigmas.
     """
     tried = [horn(m.X_a[rows], m.X_b[rows]) for rows in triples]
     S = min(tried, key=lambda one: cost(one, m, c2))
     members = [j for j in range(len(m)) if agrees(S, m, c2, j)]
-    return S, gauss_newton(S, m, members), members
+    return S, gauss_newton(S, m, members, c), members

@@ -5,7 +5,8 @@ r"""The similarity between two keyframes, from matches of which many may be wron
 
    .. math:: C = \frac1{2N} \sum_j \min(\lVert r_{b,j}\rVert^2, c^2) + \min(\lVert r_{a,j}\rVert^2, c^2) .
 
-3. Refine the cheapest one on the matches that agree with it: Levenberg-Marquardt on both reprojections.
+3. Refine the cheapest one on the matches that agree with it: Levenberg-Marquardt on both reprojections, and
+   on the ratios of distances, as well as these are known.
 4. Find who agrees now, and refine once more.
 
 The closed form of *all* agreeing matches, which looks like the natural third step, is worse than the sample
@@ -20,13 +21,15 @@ import numpy as np
 
 from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.estimation.least_squares import Options, Solution, minimise
-from vslam_ref.estimation.robust import tuned
+from vslam_ref.estimation.robust import MAD_1D, tuned
 from vslam_ref.estimation.similarity.matches import (
     LIMIT,
     PointMatches,
     agreeing,
     both_images,
     both_images_with_jacobians,
+    distance_ratio,
+    distance_ratio_with_jacobians,
     squared,
     whitened,
 )
@@ -38,6 +41,8 @@ DRAWS = 300
 """Samples.  With 70 % wrong matches one of 300 is without a wrong one with probability 0.9997."""
 LEAST = 6
 """Matches that must agree before anything is refined: three make the sample, and as many must support it."""
+LEAST_SPREAD = 0.01
+"""No distance is known better than to a hundredth of it."""
 STEPS = Options(max_iterations=50)
 
 
@@ -133,9 +138,9 @@ def estimate_similarity(
 
 
 def refine_similarity(matches: PointMatches, S_start: Array, *, options: Options | None = None) -> Solution:
-    """Similarity with the smallest reprojection errors in both keyframes, near a start.
+    """Similarity with the smallest errors of both images and of the distances, near a start.
 
-    Implements :eq:`eq-squares` with both reprojections and Huber's loss, for left perturbations of Sim(3).
+    Implements :eq:`eq-squares` with Huber's loss, for left perturbations of Sim(3).
 
     Parameters
     ----------
@@ -149,24 +154,37 @@ def refine_similarity(matches: PointMatches, S_start: Array, *, options: Options
     Returns
     -------
     Solution
-        ``x`` is S_b_a.
+        ``x`` is S_b_a; the residual has 4 N numbers of the images, then N of the distances, in sigmas.
     """
     m = matches
+    spread = distance_spread(S_start, m)
 
     def residual(S: Array) -> Array:
-        return whitened(both_images(S, m.X_a, m.X_b, camera=m.camera), m).ravel()
+        images = whitened(both_images(S, m.X_a, m.X_b, camera=m.camera), m)
+        return np.concatenate([images.ravel(), distance_ratio(S, m.X_a, m.X_b).ravel() / spread])
 
     def with_jacobian(S: Array) -> tuple[Array, Array]:
         at = both_images_with_jacobians(S, m.X_a, m.X_b, camera=m.camera)
-        return whitened(at.uv, m).ravel(), (at.J_S / m.sigma[..., None]).reshape(-1, sim3.DOF)
+        far = distance_ratio_with_jacobians(S, m.X_a, m.X_b)
+        J = (at.J_S / m.sigma[..., None]).reshape(-1, sim3.DOF)
+        r = np.concatenate([whitened(at.uv, m).ravel(), far.value.ravel() / spread])
+        return r, np.concatenate([J, far.J_S[:, 0] / spread])
 
     return minimise(
         residual,
         S_start,
         with_jacobian=with_jacobian,
-        loss=tuned("huber", 2),
-        block=2,
+        loss=tuned("huber"),
         plus=sim3.perturb,
         coordinates=sim3.DOF,
         options=options or STEPS,
     )
+
+
+def distance_spread(S_b_a: Array, matches: PointMatches) -> float:
+    """Standard deviation of the log-ratios of distances, a ratio, from the median of their deviations.
+
+    Implements :eq:`eq-mad` for ``S_b_a (4, 4)``; never less than a hundredth.
+    """
+    ratio = distance_ratio(S_b_a, matches.X_a, matches.X_b)
+    return max(MAD_1D * float(np.median(np.abs(ratio - np.median(ratio)))), LEAST_SPREAD)

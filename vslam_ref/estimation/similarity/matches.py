@@ -14,6 +14,15 @@ A match has two errors, each in standard deviations of a pixel of the octave in 
 
 Depths are the worst known numbers of a point that was triangulated from a short baseline.  An error in depth
 hardly moves a projection, while it moves the distance :math:`\lVert S X_a - X_b \rVert` by all of it.
+
+Images alone do not know the scale where the two cameras stand at one place, as they may when a loop closes:
+:math:`h(s R X + t)` is that of R X for t = 0, whatever s is.  There the distances have to tell it, as a third
+error of each match, with a standard deviation that is found from the matches:
+
+.. math:: d = \log \frac{\lVert S_{ba} X_a \rVert}{\lVert X_b \rVert} .
+
+A turn of camera b changes no distance from it, so what is badly known about distances never pulls at the
+rotation.
 """
 
 from __future__ import annotations
@@ -148,6 +157,34 @@ def both_images_with_jacobians(S_b_a: Array, X_a: Array, X_b: Array, *, camera: 
     moved = blocks([[np.eye(3), -so3.hat(X_b), X_b[..., None]]])
     J_a = -camera.project_with_jacobians(sim3.act(S_a_b, X_b)).J_point @ S_a_b[..., :3, :3] @ moved
     return BothImages(both_images(S_b_a, X_a, X_b, camera=camera), np.concatenate([J_b, J_a], -2))
+
+
+class DistanceRatio(NamedTuple):
+    """``value (..., 1)``, log-ratio of distances, and ``J_S (..., 1, 7)`` in a left perturbation of S_b_a."""
+
+    value: Array
+    J_S: Array
+
+
+def distance_ratio(S_b_a: Array, X_a: Array, X_b: Array) -> Array:
+    """Logarithm (..., 1) of how much farther from b a's point is than b's: a ratio, no unit.
+
+    Similarity ``S_b_a (..., 4, 4)``, points ``X_a (..., 3)``, ``X_b (..., 3)`` in the keyframes' own units.
+    """
+    there = np.linalg.norm(sim3.act(S_b_a, X_a), axis=-1, keepdims=True)
+    return np.asarray(np.log(there / np.linalg.norm(X_b, axis=-1, keepdims=True)))
+
+
+def distance_ratio_with_jacobians(S_b_a: Array, X_a: Array, X_b: Array) -> DistanceRatio:
+    """Logarithm of the ratio of distances, and its Jacobian: Y / |Y|^2, nothing for the rotation, and 1.
+
+    Implements the chain rule through A1.1; arguments as for :func:`distance_ratio`, units too.
+    """
+    Y = sim3.act(S_b_a, X_a)
+    shift = Y / np.sum(Y * Y, -1, keepdims=True)
+    one = np.ones_like(Y[..., :1])
+    J_S = np.concatenate([shift, np.zeros_like(Y), one], -1)[..., None, :]
+    return DistanceRatio(distance_ratio(S_b_a, X_a, X_b), J_S)
 
 
 def whitened(images: Array, matches: PointMatches) -> Array:
