@@ -63,7 +63,7 @@ def test_the_loop_is_closed_and_the_drift_is_gone(seed: int) -> None:
     assert not closer.rejected
     # features are exact, so that the adjustment of everything ends at the truth, as near as its rule for the
     # end lets it: a step that no pixel shows (1e-2 of the scale of the errors, 0.5 px, over 300 px a radian)
-    assert before > 0.3
+    assert before > 0.25
     assert walk.ate() < 0.5 * 1e-2 / 300 * 10
     assert int(walk.map.alive.sum()) < points - 50
 
@@ -72,10 +72,12 @@ def test_without_the_adjustment_the_correction_alone_takes_most_of_the_drift() -
     walk = BUILDING.draw_walk(3)
     before = walk.ate()
     closer = walked(walk, lambda _, kf: walk.revisits(kf), last_steps=0)
-    assert walk.ate() < 0.5 * before
-    # the last keyframes' unit had grown by 1.35 of the walk; the loop closed after its first lap
+    assert walk.ate() < 0.1 * before
+    # the unit of each keyframe had grown, and comes back to that of the first one, which is held: as well as
+    # a keyframe has one unit, for its points are the means of those of ten keyframes
     current = closer.closed[0].current
-    assert closer.scale[current] * walk.scale[current] == pytest.approx(1.0, rel=0.05)
+    np.testing.assert_allclose(closer.scale[: current + 1] * walk.scale[: current + 1], 1.0, rtol=0.05)
+    assert walk.scale[current] > 1.2
 
 
 def test_points_of_both_visits_become_one() -> None:
@@ -115,7 +117,8 @@ def test_a_look_alike_is_rejected_counted_and_leaves_the_map_as_it_was() -> None
 def test_a_walk_with_look_alikes_closes_the_true_loop_only() -> None:
     walk = BUILDING.draw_walk(1, look_alike=True)
     closer = walked(walk, lambda _, kf: [max(kf - 28, 0), *walk.revisits(kf)])
-    assert [v.candidate for v in closer.closed] == [v for v in (closer.closed[0].candidate,) if v < 14]
+    assert len(closer.closed) == 1
+    assert closer.closed[0].candidate < 14
     assert sum(closer.rejected.values()) >= 5
     assert walk.ate() < 1e-3
 
@@ -129,10 +132,10 @@ def test_the_similarity_is_the_true_one() -> None:
     true = se3.compose(walk.true[candidate], se3.inverse(walk.true[current]))
     S = found.S_candidate_current
     ratio = walk.scale[candidate] / walk.scale[current]
-    # neighbours' units differ by half a per cent a step, so points of ten keyframes by some per cent
-    assert sim3.scale(S) == pytest.approx(ratio, rel=0.05)
+    # units differ by 0.4 per cent a step, and a point is the mean of those of ten keyframes
+    assert sim3.scale(S) == pytest.approx(ratio, rel=0.02)
     assert np.linalg.norm(so3.log(sim3.rotation(S) @ true[:3, :3].T)) < np.deg2rad(1.0)
-    np.testing.assert_allclose(S[:3, 3], walk.scale[candidate] * true[:3, 3], atol=0.05)
+    np.testing.assert_allclose(S[:3, 3], walk.scale[candidate] * true[:3, 3], atol=0.03)
     # the camera on the candidate's side sees the candidate's points where the similarity puts them
     X = rng(3).normal(size=(5, 3)) + [0, 0, 4]
     X_world = se3.act(se3.inverse(walk.map.T_kf_world[candidate]), X)
@@ -144,13 +147,14 @@ def test_guided_search_finds_what_matching_alone_missed() -> None:
     """Descriptors differ by 3 % of their bits in each picture, 15 bits: only few pairs are within 12."""
     walk = BUILDING.draw_walk(2)
     current = len(walk.true) - 4
-    candidate = walk.revisits(current)[0]
+    candidate = walk.revisits(current)[0] + 2  # a metre ahead: it matters on which side the camera stands
     strict = LoopSettings(theta_min=50, bits=12, least_points=20)
     found = verify(walk.map, current, candidate, rng(), strict)
     assert found.reason == ""
     common = len(np.intersect1d(walk.shows[current], walk.shows[candidate]))
     assert found.matches < 0.5 * common
     assert found.inliers > 1.5 * found.matches
+    assert found.inliers > 0.6 * common
 
 
 @pytest.mark.parametrize(
@@ -177,9 +181,8 @@ def test_culled_keyframes_go_with_their_parents() -> None:
     before = walk.ate()
     walked(walk, lambda _, kf: [k for k in walk.revisits(kf) if walk.map.keyframes["alive"][k]])
     # a culled keyframe's step to its parent drifted by half a per cent, 4 mm of 0.7 m and two at most
-    assert before > 0.3
+    assert before > 0.25
     assert walk.ate() < 0.01
-    assert 1 not in np.round(sim3.scale(walk.map.T_kf_world), 6) - 1
 
 
 def test_a_second_loop_waits_and_what_is_near_is_no_candidate() -> None:
@@ -194,6 +197,7 @@ def test_a_second_loop_waits_and_what_is_near_is_no_candidate() -> None:
     assert len(closer.closed) == 1
     assert set(asked.values()) == {1}  # asked for every keyframe, so that it can remember each
     assert closer.closed[0].candidate < 14
+    assert not closer.rejected  # neighbours were never judged
 
 
 def test_the_same_walk_and_seed_give_the_same_bytes() -> None:
@@ -214,6 +218,9 @@ def test_words_propose_the_place_of_the_first_lap() -> None:
         levels=3,
         rng=rng(),
     )
+    words = CandidatesByWords(vocabulary)
+    for kf in range(len(walk.true)):
+        assert not walk.map.covisible(kf)[words(walk.map, kf)].any()
     closer = walked(walk, CandidatesByWords(vocabulary))
     assert len(closer.closed) == 1
     assert closer.closed[0].candidate < 12
@@ -248,7 +255,13 @@ def test_a_loop_twice_joined_adds_no_second_edge() -> None:
     verdict = verify(walk.map, current, walk.revisits(current)[0], rng(), FEW)
     done = join(walk.map, verdict, FEW)
     assert done.edges > len(walk.true) - 1
-    assert done.fused > 30
+    assert done.fused > 150
+    # points look as they do from where the keyframes are now
+    alive, table = np.flatnonzero(walk.map.alive), walk.map.points
+    told = table["normal"][alive].copy(), table["distance_range"][alive].copy()
+    walk.map.refresh(alive)
+    np.testing.assert_array_equal(told[0], table["normal"][alive])
+    np.testing.assert_array_equal(told[1], table["distance_range"][alive])
     assert verify(walk.map, current, verdict.candidate, rng(), FEW).reason == "few matches"  # nothing is left
 
 
