@@ -19,7 +19,7 @@ def essential_figure(
     Parameters
     ----------
     least_shared : sequence of float
-        Thresholds of the graphs, points.
+        Thresholds of the graphs, points; the first one is the tree.
     edges, after, misled, before : ndarray, shape (graphs, runs)
         Edges; ATE in metres after the closing, with a false loop, and as mapped.
     work : ndarray, shape (graphs, runs)
@@ -39,11 +39,13 @@ def essential_figure(
             left.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
         right.loglog(x, np.median(work, axis=1), "-", color=style.BLUE, marker="s")
         for k, least in enumerate(least_shared):
-            name = "tree" if np.isinf(least) else f"{least:g}"
-            right.annotate(name, (x[k], np.median(work[k])), (0, 7), textcoords="offset points", ha="center")
+            name = "tree" if k == 0 else f"{least:g}"
+            shift, side = ((-4, 7), "right") if k % 2 == 0 else ((4, -12), "left")
+            right.annotate(name, (x[k], np.median(work[k])), shift, textcoords="offset points", ha=side)
         left.set(xlabel="edges besides the loops", ylabel="ATE, m (quartiles of the drives)", title="error")
         right.set(xlabel="edges besides the loops", ylabel="multiplications, tree = 1")
         right.set(title="work, by the least number of common points")
-        right.set_ylim(top=float(np.median(work, axis=1).max()) * 2)
-        left.legend(loc="best")
+        right.margins(0.12)
+        left.set_ylim(bottom=float(after.min()) / 6)
+        left.legend(loc="lower right")
     return figure
