@@ -18,7 +18,7 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench grade clean
+.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench pair-table orb-precision grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
@@ -33,6 +33,7 @@ help:
 	@echo "make notebooks   generate and execute notebooks/ from docs/chapters/"
 	@echo "make docs        build the book into $(BUILD)/html"
 	@echo "make bench       measure this machine, beside the peers that are installed"
+	@echo "make pair-table  learn the pairs of pixels that ORB compares (make orb-precision: beside OpenCV's)"
 	@echo "make grade EXERCISE=16_name FILE=mine.py   grade an answer"
 	@echo "make clean       remove everything that was made"
 
@@ -87,6 +88,12 @@ bench: $(call DONE,fast) $(call DONE,test)
 	@mkdir -p $(OUT)
 	-$(PY) -m pip install --quiet --disable-pip-version-check --editable ".[peers]"
 	$(BIN)/vslam-ref bench --json $(OUT)/bench.json
+
+pair-table: $(call DONE,fast)
+	$(ONE_THREAD) $(PY) -m vslam_ref.experiments.orb.learned_pairs
+
+orb-precision: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/orb/precision.py
 
 grade: $(call DONE,fast) $(call DONE,test)
 	@test -n "$(EXERCISE)" && test -n "$(FILE)" || { echo "say: make grade EXERCISE=16_name FILE=mine.py" >&2; exit 2; }

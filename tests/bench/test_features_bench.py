@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.bench import features
+from vslam_ref.bench import features, orb
+from vslam_ref.features import hamming
+from vslam_ref.features.orb import extract
 
 
 def test_the_wall_has_points_enough_and_most_are_found_again() -> None:
@@ -25,3 +27,18 @@ def test_every_part_runs() -> None:
     for pair in features.peers(given).values():
         assert set(pair) == {"OpenCV", "ours"}
         pair["OpenCV"]()
+
+
+def test_orb_is_measured_beside_opencv() -> None:
+    """Both find the nearest of each descriptor, at the same distance, and 1000 features."""
+    import cv2
+
+    a, b = orb.descriptors(50)
+    theirs = cv2.BFMatcher(cv2.NORM_HAMMING).match(a, b)
+    ours = hamming.match(a, b, ratio=None, mutual=False)
+    assert ours.distance.tolist() == [m.distance for m in theirs]
+    image = features.images()["wall"][1]
+    assert len(extract(image).uv) == orb.FEATURES
+    rows = orb.measure_hamming("numpy", quick=True) + orb.measure_extraction("wall", image, "numpy", True)
+    assert [r["goal"] for r in rows] == ["FE-3"] * 3 + ["ORB"] * 3
+    assert all(r["value"] > 0 for r in rows)

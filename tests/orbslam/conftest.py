@@ -1,4 +1,4 @@
-"""A map of features without pictures: keyframes on an arc, points before them, descriptors drawn at random."""
+"""A map of features without pictures: keyframes on an arc, points before them, descriptors drawn."""
 
 from __future__ import annotations
 

@@ -95,14 +95,8 @@ def test_descriptor_is_the_one_most_like_the_others(draw_map):
     table = made.sightings["descriptor"]
     for p in range(len(made.points)):
         at = [made.features(k).start + f for k, of in sees.items() for f, q in of.items() if q == p]
-        medians = [
-            float(
-                np.median(
-                    [sum((int(a) ^ int(b)).bit_count() for a, b in zip(table[i], table[j])) for j in at]
-                )
-            )
-            for i in at
-        ]
+        words = [int.from_bytes(table[i].tobytes(), "little") for i in at]
+        medians = [np.median([(a ^ b).bit_count() for b in words]) for a in words]
         assert (made.points["descriptor"][p] == table[at[int(np.argmin(medians))]]).all()
 
 
@@ -169,5 +163,6 @@ def test_an_adjustment_passes_over_culled_keyframes(draw_map):
     for k in (3, 4):
         made.T_kf_world[k] = se3.perturb(truth[k], 0.01 * rng.standard_normal(6))
     adjust(made, Robust(tuned("tukey", 2), "adaptive", 0.4), active=[3, 4], fixed=[0, 1])
+    # the last step is below 1e-2 of what noise of half a pixel moves a pose: 0.5 / 150 over the root of 50 points
     np.testing.assert_allclose(made.T_kf_world[[0, 1, 3, 4]], truth[[0, 1, 3, 4]], atol=1e-4)
     assert (made.T_kf_world[2] == truth[2]).all()

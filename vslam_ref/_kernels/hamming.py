@@ -31,18 +31,20 @@ def _words(rows):
 
 @kernel(ROWS, ROWS, returns=types.Array(types.int32, 2, "C"))
 def distances(a, b):
-    """Twin of :func:`vslam_ref.features.hamming._distances`."""
-    p, q = _words(a), _words(b)
-    bits = np.zeros((p.shape[0], q.shape[0]), np.int32)
+    """Twin of :func:`vslam_ref.features.hamming._distances`: many of b at once, word by word."""
+    p, q = _words(a), _words(b).T.copy()
+    bits = np.zeros((p.shape[0], q.shape[1]), np.int32)
     for i in range(p.shape[0]):
         row = bits[i]
         if p.shape[1] == 4:  # 256 bits: one pass
+            q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
             p0, p1, p2, p3 = p[i, 0], p[i, 1], p[i, 2], p[i, 3]
-            for j in range(q.shape[0]):
-                low = _ones(p0 ^ q[j, 0]) + _ones(p1 ^ q[j, 1])
-                row[j] = np.int32(low + _ones(p2 ^ q[j, 2]) + _ones(p3 ^ q[j, 3]))
+            for j in range(row.shape[0]):
+                low = _ones(p0 ^ q0[j]) + _ones(p1 ^ q1[j])
+                row[j] = np.int32(low + _ones(p2 ^ q2[j]) + _ones(p3 ^ q3[j]))
         else:
-            for j in range(q.shape[0]):
-                for k in range(p.shape[1]):
-                    row[j] += np.int32(_ones(p[i, k] ^ q[j, k]))
+            for k in range(p.shape[1]):
+                word, others = p[i, k], q[k]
+                for j in range(row.shape[0]):
+                    row[j] += np.int32(_ones(word ^ others[j]))
     return bits

@@ -5,6 +5,7 @@ goal  what is measured, on one thread, in CPU time of the thread, medians of pai
 ===== =========================================================================================
 FE-2  pyramid and FAST-10 on four levels, over OpenCV's area means and FAST-9; 2 x Numba, 5 x NumPy
 FE-1  what features add to a frame with 1000 points, over one ``cv2.FAST``: part of a tracker's time
+FE-3  distances of binary descriptors, over OpenCV's matcher; ORB's extraction beside it: ``bench.orb``
 ===== =========================================================================================
 
 Two pictures of 640 x 480: a painted wall with noise, and the first two frames of ``7scenes_redkitchen`` where
@@ -23,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
+from vslam_ref.bench import orb
 from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.datasets import catalogue, pictures
 from vslam_ref.features import (
@@ -65,7 +67,12 @@ def run(quick: bool = False) -> dict[str, Any]:
     def all_pairs(backend: str, quick: bool) -> list[Row]:
         return [r for name, pair in pairs.items() for r in measure(name, scene(*pair), backend, quick)]
 
-    rows = measured("features", on_each_backend(quick, all_pairs))
+    def orb_features(backend: str, quick: bool) -> list[Row]:
+        return [
+            r for name, pair in pairs.items() for r in orb.measure_extraction(name, pair[1], backend, quick)
+        ]
+
+    rows = measured("features", on_each_backend(quick, all_pairs, orb.measure_hamming, orb_features))
     return {"rows": rows, "threads": 1, "peer": f"OpenCV {cv2.__version__}"}
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from vslam_ref.commands import run_log, run_ptam
+from vslam_ref.commands import run_log, run_orbslam, run_ptam
 
 HELP = "run a system over recorded data and compare it with the truth"
-FAMILIES = (run_log, run_ptam)
+FAMILIES = (run_log, run_ptam, run_orbslam)
 """Modules with ``SYSTEMS``, ``EPILOG``, ``add_arguments`` and ``run``, as a command has them."""
 SYSTEMS = {name: what for family in FAMILIES for name, what in family.SYSTEMS.items()}
 EPILOG = "\n\n".join(

@@ -26,8 +26,8 @@ nearest three that fit: the Sampson distance, of three pictures.  No point can l
 
 * an answer is told apart from another one as in :mod:`~vslam_ref.geometry.multiview.two_views.choice`;
 * the best answer must *agree* with the third picture: the two equations that it adds may not cost more, each,
-  than the one of the pair, by the same ratio and margin.  What moved while it was seen (people, a rolling
-  shutter) can fit two pictures, and then fails here.
+  than the one of the pair, by the same ratio (or ``agree``) and margin.  What moved while it was seen
+  (people, a rolling shutter) can fit two pictures, and then fails here.
 
 A straight path without a turn is the exception: the plane of the wrong answer then lies across the direction
 of motion in every picture, and moves only with the square of the base line.  Then nothing is told apart.
@@ -120,7 +120,14 @@ class ThirdPicture:
 
 
 def ask_third(
-    answers: ArrayLike, xn_a: ArrayLike, xn_m: ArrayLike, xn_b: ArrayLike, *, sigma: float, share: float = 0.5
+    answers: ArrayLike,
+    xn_a: ArrayLike,
+    xn_m: ArrayLike,
+    xn_b: ArrayLike,
+    *,
+    sigma: float,
+    share: float = 0.5,
+    agree: float = RATIO,
 ) -> ThirdPicture:
     """Let a third picture choose among the motions that two pictures allow, or refuse them all.
 
@@ -136,6 +143,8 @@ def ask_third(
         Standard deviation of one coordinate, pixels over focal length.
     share : float
         About how much of the motion is done at m, a ratio: where the pose of m is looked for first.
+    agree : float
+        An equation of the third picture may cost so many times as much as one of the pair, a ratio.
 
     Returns
     -------
@@ -180,7 +189,7 @@ def ask_third(
     known = _some(pair <= ONE_EQUATION)
     pair_cost = float(truncated_cost(pair[known], ONE_EQUATION))
     added = (float(truncated_cost(triples[best, known], THREE_EQUATIONS)) - pair_cost) / 2.0
-    reason = _disagreement(pair_cost, added) or _rival(each, costs, best)
+    reason = _disagreement(pair_cost, added, agree) or _rival(each, costs, best)
     return ThirdPicture(best, each[best], costs, pair_cost, added, fits[best], reason)
 
 
@@ -189,8 +198,8 @@ def _some(chosen: BoolArray) -> BoolArray:
     return chosen if chosen.any() else np.ones(len(chosen), np.bool_)
 
 
-def _disagreement(pair_cost: float, added: float) -> str:
-    if added > RATIO * pair_cost + MARGIN:
+def _disagreement(pair_cost: float, added: float, agree: float) -> str:
+    if added > agree * pair_cost + MARGIN:
         return (
             f"a picture between does not agree: it adds {added:.3g} an equation to the {pair_cost:.3g} "
             "of the pair"

@@ -1,4 +1,4 @@
-"""PTAM over a sequence of pictures: what ``vslam-ref run ptam`` does.
+"""A visual system over a sequence of pictures: what ``vslam-ref run ptam`` and ``run orbslam`` do.
 
 ::
 
@@ -7,5 +7,6 @@
                                                          |-> overlay   the film, drawn with solids and raster
                                                          '-> report    the folder: paths, map, page
 
-``interrupting`` lets a first Ctrl-C end the work between two pictures, so that what there is can be saved.
+``kinds`` says what a system must offer, and which there are.  ``interrupting`` lets a first Ctrl-C end the
+work between two pictures, so that what there is can be saved.
 """

@@ -6,12 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vslam_ref.arrays import Array
 from vslam_ref.datasets.calibration_files import CameraFile
 from vslam_ref.estimation.bundle.self_calibration import LEANS_ON
 from vslam_ref.experiments.visual_slam.paths import scale_drift, trajectory
 from vslam_ref.experiments.visual_slam.running import Run
-from vslam_ref.geometry import se3
 from vslam_ref.metrics.trajectory import absolute_error
 from vslam_ref.systems.visual_map.refine_camera import RefinedCamera
 
@@ -37,19 +35,13 @@ class PathChange(NamedTuple):
 
 def path_change(run: Run, refined: RefinedCamera) -> PathChange:
     """What the refined camera has changed in the path of a run."""
-    poses = [pose for _, pose in sorted(run.system.poses.items())]
-    T_now, T_before = (_placed(poses, T) for T in (run.system.map.T_kf_world, refined.T_kf_before))  # type: ignore[union-attr]
-    now, before = trajectory(None, T_now), trajectory(None, T_before)
+    now, before = (trajectory(None, run.system.trajectory(T)[1]) for T in (None, refined.T_kf_before))
     length = float(np.linalg.norm(np.diff(now.t_world_body, axis=0), axis=1).sum())
     try:
         apart = absolute_error(before, now, "sim3").stats.rmse
     except ValueError:
         return PathChange(None, None)
     return PathChange(100 * apart / length if length > 0 else None, scale_drift(before, now))
-
-
-def _placed(poses: list[Any], T_kf_world: Array) -> Array:
-    return np.stack([se3.compose(pose.T_cam_kf, T_kf_world[pose.kf]) for pose in poses])
 
 
 def camera_numbers(run: Run) -> dict[str, Any] | None:

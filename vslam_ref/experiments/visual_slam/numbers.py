@@ -12,6 +12,7 @@ from vslam_ref import _kernels
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Sequence
 from vslam_ref.experiments.visual_slam.camera import camera_notes, camera_numbers
+from vslam_ref.experiments.visual_slam.kinds import KINDS
 from vslam_ref.experiments.visual_slam.paths import LEAST_THIRD, scale_drift, trajectory
 from vslam_ref.experiments.visual_slam.running import (
     GOOD,
@@ -28,8 +29,6 @@ from vslam_ref.geometry.alignment import Alignment
 from vslam_ref.metrics.trajectory import MAX_DIFFERENCE, Trajectory, absolute_error, associate, no_pairs
 from vslam_ref.support.config import assumptions
 from vslam_ref.support.provenance import versions
-from vslam_ref.systems.ptam import STAGES, ConcurrentPtam
-from vslam_ref.systems.ptam.settings import Settings
 
 ROWS = (
     ("frames", "pictures", ""),
@@ -49,6 +48,8 @@ ROWS = (
     ("seconds", "time of the run, with reading and drawing", "s"),
 )
 """Key in the JSON, words and unit in the table."""
+COUNTS = 8
+"""Rows before which a system's own stand."""
 
 
 class Accuracy(NamedTuple):
@@ -122,7 +123,7 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
     final, live = accuracy(run.sequence, numbers, T), accuracy(run.sequence, *path(run, live=True))
     visual_map = system.map
     return {
-        "system": "ptam",
+        "system": run.kind.name,
         "source": run.sequence.name,
         "frames": len(frames),
         "unusable": count[UNUSABLE],
@@ -131,8 +132,9 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
         "tracked": len(numbers),
         "lost": count[LOST],
         "relocalised": sum(f.way == "relocalised" and f.state != LOST for f in frames),
-        "keyframes": 0 if visual_map is None else len(visual_map.keyframes),
+        "keyframes": 0 if visual_map is None else len(visual_map.used_keyframes()),
         "points": 0 if visual_map is None else int(visual_map.alive.sum()),
+        **run.kind.counts(system),
         "ate_rmse": final.rmse,
         "ate_percent": final.percent,
         "ate_live_rmse": live.rmse,
@@ -144,7 +146,7 @@ def document(run: Run, seconds: float) -> dict[str, Any]:
         "stage_ms": stage_ms(run),
         "seconds": seconds,
         "interrupted": run.interrupted,
-        "concurrent": isinstance(system, ConcurrentPtam),
+        "concurrent": run.concurrent,
         "start": _start(run),
         "refusals": {run.examples[kind]: n for kind, n in run.refusals.most_common()},
         "settings": changed(run.settings),
@@ -162,7 +164,7 @@ def _rate(frames: list[Frame]) -> float | None:
 
 def stage_ms(run: Run) -> dict[str, float]:
     """Median milliseconds of each stage over the pictures in which it had a part, of the processor."""
-    times = {name: [f.stages[name] for f in run.frames if name in f.stages] for name in STAGES}
+    times = {name: [f.stages[name] for f in run.frames if name in f.stages] for name in run.kind.stages}
     return {name: 1e3 * float(np.median(seconds)) for name, seconds in times.items() if seconds}
 
 
@@ -192,9 +194,9 @@ def _start(run: Run) -> dict[str, Any] | None:
     }
 
 
-def changed(settings: Settings) -> dict[str, dict[str, Any]]:
+def changed(settings: Any) -> dict[str, dict[str, Any]]:
     """Settings that are not as they come: value and default."""
-    rows = assumptions(settings, Settings())
+    rows = assumptions(settings, type(settings)())
     return {
         r["key"]: {"value": r["value"], "default": r["default"]} for r in rows if r["value"] != r["default"]
     }
@@ -216,7 +218,9 @@ def notes(run: Run, final: Accuracy) -> list[str]:
 
 def number_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the table of numbers; what is not known is left out."""
-    rows = [[words, _show(content[key]), unit] for key, words, unit in ROWS if content[key] is not None]
+    more = next(kind.rows for kind in KINDS if kind.name == content["system"])
+    every = (*ROWS[:COUNTS], *more, *ROWS[COUNTS:])
+    rows = [[words, _show(content[key]), unit] for key, words, unit in every if content[key] is not None]
     kinds = content["picture_ms"].items()
     rows += [[f"median, {kind.replace('_', ' ')}", _show(v), "ms"] for kind, v in kinds if v is not None]
     return rows + [[f"stage: {name}", _show(v), "ms of CPU"] for name, v in content["stage_ms"].items()]

@@ -1,4 +1,4 @@
-"""What ``vslam-ref run ptam`` leaves.
+"""What ``vslam-ref run ptam`` and ``orbslam`` leave.
 
 ::
 
@@ -50,22 +50,19 @@ from vslam_ref.plot.visual_slam import (
 from vslam_ref.support import pages
 from vslam_ref.support.files import write_text
 from vslam_ref.support.json_text import to_json
-from vslam_ref.systems.ptam import STAGES
-from vslam_ref.systems.visual_map import VisualMap
+from vslam_ref.systems.visual_map import KeyframeMap
 from vslam_ref.systems.visual_map.adjusting import as_problem
 
 FILM = "overlay.webm"
-MAPPING = ("start", "look again", "new points", "neighbours", "local", "global")
-"""Stages of a picture that becomes a keyframe."""
 FILES = (
     *("trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply", "camera.yaml", FILM),
     "result.json",
 )
 LEGEND = (
     "Points that were tracked: vermilion, yellow, sky blue, blue (and larger) on levels 0, 1, 2, 3 of the "
-    "pyramid; green lines before the start: how corners moved. White: a grid on the dominant plane of the "
-    "map, on which a house stands. The strip at the bottom: grey without a map, green at the start, then "
-    "blue good, orange poor, vermilion lost."
+    "pyramid (an octave of ORB counts as the level next to it); green lines before the start: how corners "
+    "moved. White: a grid on the dominant plane of the map, on which a house stands. The strip at the "
+    "bottom: grey without a map, green at the start, then blue good, orange poor, vermilion lost."
 )
 
 SPREAD = (
@@ -76,7 +73,7 @@ SPREAD = (
 
 def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
     """Write all but the film into ``folder``."""
-    title = f"PTAM on {Path(run.sequence.name).name}"
+    title = f"{run.kind.title} on {Path(run.sequence.name).name}"
     figures = {"course": course_figure(course(run), title), "stages": stages_figure(stages(run), title)}
     visual_map = run.system.map
     if visual_map is not None:
@@ -87,25 +84,25 @@ def write_report(folder: Path, run: Run, content: Mapping[str, Any]) -> None:
     if (found := camera_file(run)) is not None:
         write_opencv(folder / "camera.yaml", found)
     for name, figure in figures.items():
-        (folder / f"{name}.png").write_bytes(figure_bytes(figure, "png", "ptam"))
+        (folder / f"{name}.png").write_bytes(figure_bytes(figure, "png", run.kind.name))
     write_text(folder / "result.json", to_json(content))
     write_text(folder / "report.html", page(folder, run, content, title, tuple(figures)))
 
 
-def write_paths(folder: Path, run: Run, visual_map: VisualMap) -> None:
+def write_paths(folder: Path, run: Run, visual_map: KeyframeMap) -> None:
     """Write the three trajectories."""
     times = run.sequence.times
-    frames = visual_map.keyframes["frame"]
+    used = visual_map.used_keyframes()
     paths = {
         "trajectory": path(run),
         "trajectory_live": path(run, live=True),
-        "keyframes": (frames, visual_map.T_kf_world),
+        "keyframes": (visual_map.keyframes["frame"][used], visual_map.T_kf_world[used]),
     }
     for name, (numbers, T_cam_world) in paths.items():
         trajectories.write(folder / f"{name}.txt", trajectory(times[numbers], T_cam_world), "tum")
 
 
-def write_map(target: Path, visual_map: VisualMap) -> None:
+def write_map(target: Path, visual_map: KeyframeMap) -> None:
     """Write the living points, each in the grey of the picture in which it was first seen."""
     whole = as_problem(visual_map)
     height, width = visual_map.shape
@@ -114,12 +111,13 @@ def write_map(target: Path, visual_map: VisualMap) -> None:
     write_ply(target, BundleFile(whole.problem, colours=colours, image_sizes=sizes))
 
 
-def scene(run: Run, visual_map: VisualMap, final: Accuracy) -> MapDrawing:
+def scene(run: Run, visual_map: KeyframeMap, final: Accuracy) -> MapDrawing:
     """The map as it is drawn: in the frame of the truth where there is one."""
     numbers, T = path(run)
     gaps = np.flatnonzero(np.diff(numbers) > _step(run)) + 1
     way = np.insert(camera_pose.centre_from_pose(T), gaps, np.nan, axis=0)
-    points, kf = visual_map.X_world[visual_map.alive], camera_pose.centre_from_pose(visual_map.T_kf_world)
+    points, used = visual_map.X_world[visual_map.alive], visual_map.used_keyframes()
+    kf = camera_pose.centre_from_pose(visual_map.T_kf_world[used])
     if final.alignment is None:
         return MapDrawing(points, kf, way, np.zeros((0, 3)), "median depth of the first picture", True)
 
@@ -161,11 +159,11 @@ def stages(run: Run) -> StagesDrawing:
     number = np.array([f.number for f in run.frames], np.int64)
     times = {
         name: np.array([1e3 * f.stages.get(name, 0.0) for f in run.frames])
-        for name in STAGES
+        for name in run.kind.stages
         if any(name in f.stages for f in run.frames)
     }
-    mapping = {name: ms for name, ms in times.items() if name in MAPPING}
-    return StagesDrawing(number, {n: ms for n, ms in times.items() if n not in MAPPING}, mapping)
+    mapping = {name: ms for name, ms in times.items() if name in run.kind.mapping}
+    return StagesDrawing(number, {n: ms for n, ms in times.items() if n not in run.kind.mapping}, mapping)
 
 
 def page(folder: Path, run: Run, content: Mapping[str, Any], title: str, figures: tuple[str, ...]) -> str:

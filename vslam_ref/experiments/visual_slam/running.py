@@ -9,20 +9,17 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
-from vslam_ref.systems.ptam.concurrent import ConcurrentPtam
-from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
-from vslam_ref.systems.ptam.settings import Settings
-from vslam_ref.systems.ptam.start import Attempt
-from vslam_ref.systems.ptam.tracker.tracker import Tracked
-from vslam_ref.systems.ptam.trails import FIRST, Trails
+from vslam_ref.experiments.visual_slam.kinds import Kind, VisualSystem, kind_of
+from vslam_ref.systems.ptam import ConcurrentPtam
 from vslam_ref.systems.visual_map.chosen_start import ChosenStart
+from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, TrackedPicture
 
 UNUSABLE, WAITING, START, GOOD, POOR, LOST = "unusable", "waiting", "start", "good", "poor", "lost"
 STATES = (UNUSABLE, WAITING, START, GOOD, POOR, LOST)
@@ -69,7 +66,7 @@ class Frame(NamedTuple):
     seconds : float
         That the system took, by the clock on the wall.
     stages : mapping of str to float
-        Seconds that its stages took of the processor, as :data:`~vslam_ref.systems.ptam.STAGES` names them.
+        Seconds that its stages took of the processor, as the system names them.
     keyframe : bool
     marks : Marks
     """
@@ -95,7 +92,8 @@ class Run:
     ----------
     sequence : Sequence
     settings : Settings
-    system : Ptam
+        Of the system.
+    system : VisualSystem
     frames : list of Frame
     start : Attempt or None
         Of the two pictures that made the map.
@@ -109,11 +107,13 @@ class Run:
         Whether the run, or its film, was ended before its time.
     filmed : int or None
         Pictures of the film; None without one.
+    concurrent : bool
+        Whether mapping had a thread of its own.
     """
 
     sequence: Sequence
-    settings: Settings
-    system: Ptam
+    settings: Any
+    system: VisualSystem
     frames: list[Frame] = field(default_factory=list)
     start: Attempt | None = None
     refusals: Counter[str] = field(default_factory=Counter)
@@ -121,6 +121,12 @@ class Run:
     finish_seconds: float = 0.0
     interrupted: bool = False
     filmed: int | None = None
+    concurrent: bool = False
+
+    @property
+    def kind(self) -> Kind:
+        """Which system it is."""
+        return kind_of(self.settings)
 
     def refused(self, reason: str) -> None:
         """Count a reason why there is no map yet."""
@@ -145,20 +151,21 @@ class Run:
 
 def run(
     sequence: Sequence,
-    settings: Settings,
+    settings: Any,
     stop: Callable[[Run], bool] = lambda done: False,
     progress: Callable[[], object] = lambda: None,
     *,
     chosen: ChosenStart | None = None,
     concurrent: bool = False,
 ) -> Run:
-    """Run PTAM over a sequence.
+    """Run a system over a sequence.
 
     Parameters
     ----------
     sequence : Sequence
         With a camera.
     settings : Settings
+        Of PTAM or of ORB-SLAM; they decide which of the two runs.
     stop : callable
         Asked before each picture, with the run so far; true ends it there.
     progress : callable
@@ -175,8 +182,8 @@ def run(
     """
     if sequence.camera is None:
         raise ValueError(f"{sequence.name} has no camera: need one")
-    system = (ConcurrentPtam if concurrent else Ptam)(sequence.camera, settings, chosen)
-    done = Run(sequence, settings, system)
+    system = kind_of(settings).make(sequence.camera, settings, chosen, concurrent)
+    done = Run(sequence, settings, system, concurrent=concurrent)
     with closing(system):
         for image in sequence:
             if stop(done):
@@ -208,56 +215,56 @@ def _one(done: Run, image: Image) -> Frame:
     seconds = time.perf_counter() - began
     frame = Frame(image.number, image.time, WAITING, seconds=seconds, stages=outcome.stages)
     if outcome.tracked is not None:
-        return _tracked(frame, outcome, outcome.tracked)
+        return _tracked(done, frame, outcome)
     if not had_map and done.system.map is not None and isinstance(outcome.attempt, Attempt):
         done.start = outcome.attempt
-        return frame._replace(state=START, keyframe=True, marks=_start_marks(outcome.attempt))
+        return frame._replace(state=START, keyframe=True, marks=_start_marks(done, outcome.attempt))
     return _waited(done, frame, outcome)
 
 
-def _tracked(frame: Frame, outcome: PictureOutcome, tracked: Tracked) -> Frame:
-    fine = tracked.fine
-    state = tracked.quality.value
+def _tracked(done: Run, frame: Frame, outcome: PictureOutcome) -> Frame:
+    tracked: TrackedPicture = outcome.tracked
+    told = tracked.told()
+    state = told.quality.value
     if state == LOST:
-        return frame._replace(state=state, way=tracked.way, tried=len(fine.seen.point))
-    held = fine.weights > 0
-    marks = Marks(fine.uv[held].astype(np.float32), fine.seen.level[held].astype(np.uint8))
+        return frame._replace(state=state, way=told.way, tried=told.tried)
     return frame._replace(
         state=state,
-        way=tracked.way,
-        tried=len(fine.seen.point),
-        found=int(held.sum()),
-        sigma=float(tracked.pose.sigma),
+        way=told.way,
+        tried=told.tried,
+        found=len(told.uv),
+        sigma=told.sigma,
         keyframe=outcome.mapped is not None or outcome.queued,
-        marks=marks,
+        marks=Marks(told.uv.astype(np.float32), halvings(done, told.level)),
     )
 
 
-def _start_marks(attempt: Attempt) -> Marks:
+def halvings(done: Run, level: IntArray) -> NDArray[np.uint8]:
+    """Levels (n,) as levels of a pyramid whose pixels are twice as wide from one to the next, rounded."""
+    width = done.kind.width(done.settings)
+    return np.asarray(np.rint(level * np.log2(width)), np.uint8)
+
+
+def _start_marks(done: Run, attempt: Attempt) -> Marks:
     good = attempt.good
     uv, first = (values[good].astype(np.float32) for values in (attempt.uv_b, attempt.uv_a))
-    return Marks(uv, attempt.level[good].astype(np.uint8), first)
+    return Marks(uv, halvings(done, attempt.level[good]), first)
 
 
 def _waited(done: Run, frame: Frame, outcome: PictureOutcome) -> Frame:
     """No map yet: note the reason, and the trails to be drawn."""
-    trails = done.system.trails
-    if done.system.chosen is not None:
-        return frame if trails is None else frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
-    if isinstance(outcome.attempt, Attempt):
-        done.refused(outcome.attempt.reason)
-    elif outcome.attempt is not None:
-        done.refused(outcome.attempt)
-    if outcome.waiting and outcome.waiting != FIRST:
-        done.refused(outcome.waiting)
-    if trails is None or len(trails.pictures) < 2:
+    if done.system.chosen is None:
+        if isinstance(outcome.attempt, Attempt):
+            done.refused(outcome.attempt.reason)
+        elif outcome.attempt is not None:
+            done.refused(outcome.attempt)
+        if outcome.waiting and outcome.waiting != FIRST:
+            done.refused(outcome.waiting)
+    trail = done.system.trail()
+    if trail is None:
         return frame
-    return frame._replace(tried=len(trails.now), marks=_trail_marks(trails))
-
-
-def _trail_marks(trails: Trails) -> Marks:
-    now, first = trails.now.astype(np.float32), trails.first.astype(np.float32)
-    return Marks(now, trails.level.astype(np.uint8), first)
+    now, first = trail.now.astype(np.float32), trail.first.astype(np.float32)
+    return frame._replace(tried=len(now), marks=Marks(now, halvings(done, trail.level), first))
 
 
 def path(run: Run, live: bool = False) -> tuple[IntArray, Array]:

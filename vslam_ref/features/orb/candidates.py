@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vslam_ref.arrays import IntArray
-from vslam_ref.features.corners import detect, is_peak
+from vslam_ref.features.corners import Corners, detect, is_peak
 from vslam_ref.features.fast import Pixels, corner_score
 from vslam_ref.features.levels import Bytes
 
@@ -40,13 +40,26 @@ def candidates(image: Bytes, threshold: int, low_threshold: int, cell: int) -> C
     -------
     Candidates
     """
-    found = detect(image, low_threshold, ARC)
-    score = corner_score(image, found.xy, ARC)
-    inside = (found.xy >= BORDER).all(1) & (found.xy < np.array(image.shape[::-1]) - BORDER).all(1)
-    keep = is_peak(found, score) & inside
-    xy, score = found.xy[keep], score[keep]
-    across = image.shape[1] // cell + 1
-    at = (xy[:, 1] // cell) * across + xy[:, 0] // cell
-    bright = np.bincount(at[score >= threshold], minlength=int(at.max(initial=0)) + 1) > 0
-    kept = (score >= threshold) | ~bright[at]  # eq-orb-cell
-    return Candidates(xy[kept], score[kept])
+    found = _peaks(image, detect(image, threshold, ARC))
+    full = np.zeros([n // cell + 3 for n in image.shape], np.bool_)  # with a cell more on each side
+    full[tuple(found.xy.T[::-1] // cell + 1)] = True
+    empty = ~full
+    empty[:, [0, -1]] = empty[[0, -1]] = False
+    near = np.any([np.roll(empty, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
+    low = detect(image, low_threshold, ARC)
+    more = _peaks(image, low.only(near[tuple(low.xy.T[::-1] // cell + 1)]))
+    alone = empty[tuple(more.xy.T[::-1] // cell + 1)]  # eq-orb-cell
+    xy, score = np.concatenate([found.xy, more.xy[alone]]), np.concatenate([found.score, more.score[alone]])
+    order = np.lexsort(xy.T)
+    return Candidates(xy[order], score[order])
+
+
+def _peaks(image: Bytes, corners: Corners) -> Candidates:
+    """Those of the corners that are above their neighbours and not near the border."""
+    score = corner_score(image, corners.xy, ARC)
+    keep = is_peak(corners, score)
+    xy, score = corners.xy[keep], score[keep]
+    x, y = xy.T
+    height, width = image.shape
+    inside = (x >= BORDER) & (x < width - BORDER) & (y >= BORDER) & (y < height - BORDER)
+    return Candidates(xy[inside], score[inside])

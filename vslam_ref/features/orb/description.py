@@ -14,6 +14,8 @@ from vslam_ref.features.orb.pair_table import PAIRS
 
 WEIGHTS = np.array([18, 34, 49, 54, 49, 34, 18])
 """A Gaussian of two pixels on seven, as 256ths; the middle one takes what rounding left over."""
+UNIT = 1e-6
+"""A direction's length may be so far from 1."""
 
 
 def smooth(image: ArrayLike) -> Bytes:
@@ -81,7 +83,8 @@ def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
     Raises
     ------
     ValueError
-        If the picture is not grey with 8 bits, a pixel is nearer to the border, or a number is missing.
+        If the picture is not grey with 8 bits, a pixel is nearer to the border, or a direction's length
+        is not 1.
 
     Examples
     --------
@@ -93,16 +96,30 @@ def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
     unit = as_array("direction", direction, 2)
     if unit.shape != at.shape:
         raise ValueError(f"direction is of shape {unit.shape}: need {at.shape}, one for each pixel")
+    off = ~(np.abs(np.hypot(unit[:, 0], unit[:, 1]) - 1) <= UNIT)
+    if off.any():
+        raise ValueError(f"direction {unit[off][0].tolist()}: need (cos, sin) of an angle, of length 1")
     return _describe(whole.reshape(-1), whole.shape[1], at, unit, PAIRS)
 
 
 @accelerated("orb:describe")
 def _describe(flat: Bytes, width: int, xy: Pixels, direction: Array, pairs: IntArray) -> Bytes:
     """Descriptors (n, len(pairs) / 8) in a picture in rows (H * width,); pairs (m, 4) are x, y, x, y."""
-    c, s = direction[:, 0, None, None], direction[:, 1, None, None]
-    x, y = pairs[:, 0::2], pairs[:, 1::2]  # (m, 2): of the first pixel and of the second
-    dx = np.rint(c * x - s * y).astype(np.int64)  # (n, m, 2) eq-orb-steer
-    dy = np.rint(s * x + c * y).astype(np.int64)
-    at = (xy[:, 1].astype(np.int64) * width + xy[:, 0])[:, None, None] + dy * width + dx
-    value = flat[at]
+    value = _turned(flat, width, xy, direction, pairs.reshape(-1, 2)).reshape(len(xy), len(pairs), 2)
     return np.packbits(value[..., 0] < value[..., 1], axis=1, bitorder="little")  # eq-orb-test
+
+
+def turned_pixels(smoothed: Bytes, xy: Pixels, direction: Array, offset: IntArray) -> Bytes:
+    """Grey levels (n, m) around each pixel (n, 2), at offsets (m, 2) in pixels that turn with the directions.
+
+    Implements :eq:`eq-orb-steer`.
+    """
+    return _turned(smoothed.reshape(-1), smoothed.shape[1], xy, direction, offset)
+
+
+def _turned(flat: Bytes, width: int, xy: Pixels, direction: Array, offset: IntArray) -> Bytes:
+    c, s = direction[:, 0, None], direction[:, 1, None]
+    dx = np.rint(c * offset[:, 0] - s * offset[:, 1]).astype(np.int64)  # (n, m) eq-orb-steer
+    dy = np.rint(s * offset[:, 0] + c * offset[:, 1]).astype(np.int64)
+    grey_level: Bytes = flat[(xy[:, 1].astype(np.int64) * width + xy[:, 0])[:, None] + dy * width + dx]
+    return grey_level

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features.levels import Bytes
-from vslam_ref.features.orb.candidates import BORDER, candidates
+from vslam_ref.features.orb.candidates import BORDER, Candidates, candidates
 from vslam_ref.features.orb.description import describe, smooth
 from vslam_ref.features.orb.direction import moments, towards
 from vslam_ref.features.orb.scales import finest_from_octave, octave_images
@@ -91,22 +91,27 @@ def shares(settings: OrbSettings) -> list[int]:
     return np.diff(until, prepend=0).tolist()  # type: ignore[no-any-return]
 
 
-def _of_octave(image: Bytes, octave: int, wanted: int, settings: OrbSettings) -> OrbFeatures:
-    """Features of one octave's picture."""
+def located(image: Bytes, wanted: int, settings: OrbSettings) -> Candidates:
+    """Corners of one octave's picture (H, W) that become features, with their scores: about ``wanted``."""
     if min(image.shape) <= 2 * BORDER:
-        none = np.zeros(0)
-        return OrbFeatures(np.zeros((0, 2)), none.astype(np.int64), none, none, np.zeros((0, 32), np.uint8))
+        return Candidates(np.zeros((0, 2), np.int32), np.zeros(0, np.int64))
     xy, score = candidates(image, settings.threshold, settings.low_threshold, settings.cell)
     if settings.spread:
         keep = spread(xy, score, image.shape, wanted)
     else:
         keep = np.sort(np.argsort(-score, kind="stable")[:wanted])
-    xy, score = xy[keep], score[keep]
+    return Candidates(xy[keep], score[keep])
+
+
+def _of_octave(image: Bytes, octave: int, wanted: int, settings: OrbSettings) -> OrbFeatures:
+    """Features of one octave's picture."""
+    xy, score = located(image, wanted, settings)
     moment = moments(image, xy)
+    bits = describe(smooth(image), xy, towards(moment)) if len(xy) else np.zeros((0, 32), np.uint8)
     return OrbFeatures(
         uv=finest_from_octave(xy, octave, settings.scale),
         octave=np.full(len(xy), octave),
         angle=np.arctan2(moment[:, 1], moment[:, 0]),  # eq-orb-angle
         response=score.astype(np.float64),
-        descriptor=describe(smooth(image), xy, towards(moment)),
+        descriptor=bits,
     )

@@ -32,7 +32,7 @@ from vslam_ref.systems.orbslam.start_steps import MatchingSteps
 from vslam_ref.systems.orbslam.tracker.tracker import FeatureTracker, TrackedFeatures
 from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 from vslam_ref.systems.visual_map.refine_camera import RefinedCamera, refine_camera
-from vslam_ref.systems.visual_map.telling import Attempt, PictureOutcome, Pose, Quality, Trail, path_of
+from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, Pose, Quality, Trail, path_of
 
 STAGES = (
     "features", "start", "search", "pose", "local map", "recover",
@@ -118,7 +118,7 @@ class OrbSlam:
         steps, s = self._steps(), self.settings.start
         if self.chosen is not None:
             return self._towards(self.chosen, picture)
-        why = start_steps.FIRST
+        why = FIRST
         if self.matched is not None:
             went = steps.go_on(self.matched, picture)
             why = start_steps.worn(went, s)
@@ -220,9 +220,19 @@ class OrbSlam:
     def close(self) -> None:
         """Leave nothing running; here there is nothing."""
 
-    def trajectory(self) -> tuple[Array, Array]:
-        """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""
-        return path_of(self.poses, np.zeros((0, 4, 4)) if self.map is None else settled_poses(self.map))
+    def trajectory(self, T_kf_world: Array | None = None) -> tuple[Array, Array]:
+        """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4).
+
+        With other poses ``T_kf_world (K, 4, 4)`` of the keyframes, if such are given; the map's own unit.
+        """
+        if self.map is None:
+            return path_of({}, np.zeros((0, 4, 4)))
+        return path_of(self.poses, settled_poses(self.map, T_kf_world))
+
+    def counts(self) -> dict[str, int]:
+        """What this system counts beside what all do."""
+        culled = 0 if self.map is None else self.map.culled
+        return {"loops": self.loops, "loops_rejected": 0, "essential_edges": 0, "culled_keyframes": culled}
 
     def trail(self) -> Trail | None:
         """Features that are followed before there is a map; None without any."""

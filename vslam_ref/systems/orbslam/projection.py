@@ -15,7 +15,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features.orb import OrbFeatures
@@ -48,10 +47,6 @@ class Expected(NamedTuple):
     level: IntArray
     depth: Array
 
-    def only(self, rows: IntArray) -> Expected:
-        """Return some of them."""
-        return Expected(*(values[rows] for values in self))
-
 
 def expected(feature_map: FeatureMap, points: IntArray, T_cam_world: Array) -> Expected:
     """Points (n,) that a camera at a pose (4, 4) should see, the map's own unit."""
@@ -79,7 +74,6 @@ def find(
     radius: float,
     limit: int,
     ratio: float = 1.0,
-    free: ArrayLike | None = None,
 ) -> IntArray:
     """Feature (n,) that shows each expected point, or -1; each feature shows one point at most.
 
@@ -95,14 +89,8 @@ def find(
         Largest distance, bits.
     ratio : float
         Of the best to the second distance.
-    free : array_like of int, optional
-        Only these features; all by default.
     """
-    chosen = np.arange(len(features.uv)) if free is None else np.asarray(free, np.int64)
-    some = features if free is None else OrbFeatures(*(values[chosen] for values in features))
     width = radius * feature_map.level_sigma(at.level)
     descriptor = feature_map.points["descriptor"][at.point]
-    answers = search_windows(Places(at.uv, width, at.level - 1, at.level + 1, descriptor), some)
-    feature = assigned(answers, limit=limit, ratio=ratio, room=len(chosen))
-    feature[feature >= 0] = chosen[feature[feature >= 0]]
-    return feature
+    answers = search_windows(Places(at.uv, width, at.level - 1, at.level + 1, descriptor), features)
+    return assigned(answers, limit=limit, ratio=ratio, room=len(features.uv))

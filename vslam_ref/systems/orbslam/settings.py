@@ -41,6 +41,7 @@ class StartSettings:
     """From two pictures to a map; every field has its own unit, beside it."""
 
     least_matches: int = assume(100, "matches", "fewer: the first picture is another one; ORB-SLAM's")
+    octaves: int = assume(3, "", "finest ones, that are matched: what coarser ones show lies too loosely")
     window: float = assume(0.15, "of the width", "half side of the window around the last match")
     ratio: float = assume(0.9, "", "of the best to the second distance; ORB-SLAM's")
     least_motion: float = assume(8.0, "px", "median length of the matches before a start is tried")
@@ -53,6 +54,9 @@ class StartSettings:
         50, "points", "with that parallax; a median of 1.5 degrees is not reached by forward motion"
     )
     cost: float = assume(0.5, "px^2 per pair", "Sampson distance squared, of inliers and outliers alike")
+    agree: float = assume(
+        2.5, "", "an equation of the picture between may cost so much more: corners lie on whole pixels"
+    )
     patience: int = assume(60, "pictures", "then the newest is the first one")
 
 
@@ -80,9 +84,9 @@ class TrackerSettings:
 class KeyframeSettings:
     """When a picture becomes a keyframe; every field has its own unit, beside it."""
 
-    fewer: float = assume(0.75, "share", "of the most points since the last keyframe")
+    fewer: float = assume(0.8, "share", "of the most points since the last keyframe")
     gap: int = assume(1, "pictures", "since the last, at least")
-    most: int = assume(20, "pictures", "since the last, if the camera has moved")
+    most: int = assume(8, "pictures", "since the last, if the camera has moved")
     distance: float = assume(0.02, "of the median depth", "that counts as moved")
     least_inliers: int = assume(40, "points", "a pose from fewer spoils the map")
 

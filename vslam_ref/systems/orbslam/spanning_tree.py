@@ -53,9 +53,10 @@ def children(feature_map: FeatureMap, kf: int) -> IntArray:
     return np.flatnonzero((feature_map.keyframes["parent"] == kf) & feature_map.keyframes["alive"])
 
 
-def settled_poses(feature_map: FeatureMap) -> Array:
-    """Poses ``T_kf_world`` (K, 4, 4); a culled keyframe goes with its parent."""
-    table, T = feature_map.keyframes, feature_map.T_kf_world.copy()
+def settled_poses(feature_map: FeatureMap, T_kf_world: Array | None = None) -> Array:
+    """Poses ``T_kf_world`` (K, 4, 4), the map's or others; a culled keyframe goes with its parent."""
+    table = feature_map.keyframes
+    T = (feature_map.T_kf_world if T_kf_world is None else T_kf_world).copy()
     done = table["alive"].copy()
 
     def settle(kf: int) -> None:

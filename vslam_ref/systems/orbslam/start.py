@@ -19,17 +19,16 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features.orb import OrbFeatures
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
+from vslam_ref.geometry.multiview.two_views import essential_consensus
 from vslam_ref.systems.orbslam.feature_map import DescribedPicture, FeatureMap
 from vslam_ref.systems.orbslam.mapper.adjusting import adjust_all
 from vslam_ref.systems.orbslam.mapper.new_points import new_points
 from vslam_ref.systems.orbslam.settings import FeatureSettings, Settings, StartSettings
 from vslam_ref.systems.orbslam.spanning_tree import link
 from vslam_ref.systems.orbslam.window_search import Places, assigned, search_windows
-from vslam_ref.systems.visual_map.starting import Between, Pair, judge_start, unit_depth
+from vslam_ref.systems.visual_map.starting import DRAWS, Between, Pair, judge_start, one_pixel, unit_depth
 from vslam_ref.systems.visual_map.telling import Attempt
 
-FIRST = "the first picture"
-"""Why nothing is tried with it."""
 BIN = 2 * np.pi / 30
 """Of the histogram of turns: matches whose turn is not among the commonest are wrong."""
 
@@ -66,10 +65,11 @@ class Matched:
         return float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
 
 
-def begin(picture: DescribedPicture) -> Matched:
+def begin(picture: DescribedPicture, s: StartSettings) -> Matched:
     """Take a picture as the first."""
-    uv = picture.features.uv
-    return Matched([picture], uv[None], np.arange(len(uv)), uv)
+    f = picture.features
+    feature = np.where(f.octave < s.octaves, np.arange(len(f.uv)), -1)
+    return Matched([picture], f.uv[None], feature, f.uv)
 
 
 def go_on(
@@ -81,6 +81,7 @@ def go_on(
         matched.last, np.full(len(a.uv), s.window * shape[1]), a.octave - 1, a.octave + 1, a.descriptor
     )
     feature = assigned(search_windows(places, b), limit=f.near, ratio=s.ratio, room=len(b.uv))
+    feature[a.octave >= s.octaves] = -1
     rows = np.flatnonzero(feature >= 0)
     feature[rows[~same_turn(a, rows, b, feature[rows])]] = -1
     found = feature >= 0
@@ -137,17 +138,29 @@ def attempt(
         return f"{len(rows)} features are still found: need {s.least_matches}"
     level = matched.pictures[0].features.octave[rows]
     pair = Pair(matched.places[0, rows], matched.places[-1, rows], level, scale ** level.astype(float), rows)
-    return judge_start(camera, pair, _between(matched), s, rng)
+    return judge_start(camera, pair, _between(camera, matched, s, rng), s, rng)
 
 
-def _between(matched: Matched) -> Between | None:
-    """The picture that lies half way, by how far the features had moved; None without one."""
+def _between(camera: Camera, matched: Matched, s: StartSettings, rng: np.random.Generator) -> Between | None:
+    """The picture that lies half way, by how far the features had moved; None without one.
+
+    A corner may have been found beside its place there: what fits no motion from the first picture is left
+    out, as the pairs that fit none are.
+    """
     moved = np.array([matched.moved(k) for k in range(len(matched.pictures))])
     if len(moved) < 3:
         return None
     number = 1 + int(np.argmin(np.abs(moved[1:-1] - 0.5 * moved[-1])))
+    first, uv = (matched.places[k, matched.rows] for k in (0, number))
+    seen = np.flatnonzero(np.isfinite(uv[:, 0]))
+    a, m = camera.unproject(first[seen]).xn, camera.unproject(uv[seen]).xn
+    fits = essential_consensus(a, m, rng, sigma=one_pixel(camera), draws=DRAWS)
+    if fits.reason:
+        return None
+    kept = np.full_like(uv, np.nan)
+    kept[seen[fits.inliers]] = uv[seen[fits.inliers]]
     share = float(moved[number] / max(moved[-1], 1e-9))
-    return Between(matched.pictures[number].number, matched.places[number, matched.rows], share)
+    return Between(matched.pictures[number].number, kept, share, s.agree)
 
 
 def first_map(

@@ -29,7 +29,7 @@ class MatchingSteps:
 
     def begin(self, picture: DescribedPicture) -> start.Matched:
         """Take a picture as the first."""
-        return start.begin(picture)
+        return start.begin(picture, self.settings.start)
 
     def go_on(self, matched: start.Matched, picture: DescribedPicture) -> start.Matched:
         """Match the first with the next."""

@@ -40,10 +40,6 @@ class Places(NamedTuple):
     high: IntArray
     descriptor: Bytes
 
-    def only(self, rows: IntArray) -> Places:
-        """Return some of them."""
-        return Places(*(values[rows] for values in self))
-
 
 class Answers(NamedTuple):
     """Best ``feature (m,)`` of each place, -1 without one; its ``distance (m,)``; that of the ``second``."""

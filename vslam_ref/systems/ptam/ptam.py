@@ -230,9 +230,14 @@ class Ptam:
     def close(self) -> None:
         """Leave nothing running; here there is nothing."""
 
-    def trajectory(self) -> tuple[Array, Array]:
-        """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4)."""
-        return path_of(self.poses, np.zeros((0, 4, 4)) if self.map is None else self.map.T_kf_world)
+    def trajectory(self, T_kf_world: Array | None = None) -> tuple[Array, Array]:
+        """Numbers of the pictures that have a pose (n,), and their poses ``T_cam_world`` (n, 4, 4).
+
+        With other poses ``T_kf_world (K, 4, 4)`` of the keyframes, if such are given; the map's own unit.
+        """
+        if self.map is None:
+            return path_of({}, np.zeros((0, 4, 4)))
+        return path_of(self.poses, self.map.T_kf_world if T_kf_world is None else T_kf_world)
 
     def trail(self) -> Trail | None:
         """Points that are followed before there is a map; None without any."""

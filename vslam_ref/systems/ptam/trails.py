@@ -31,11 +31,10 @@ from vslam_ref.features import (
 from vslam_ref.systems.ptam.look import spread, strong_corners
 from vslam_ref.systems.ptam.settings import FeatureSettings, StartSettings
 from vslam_ref.systems.visual_map import PreparedPicture
+from vslam_ref.systems.visual_map.telling import FIRST
 
 LEVELS = (0, 1)
 """Of the pyramid, on which trails run: a bare scene has too few corners on one."""
-FIRST = "the first picture"
-"""Why nothing is tried with it."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview import Views, two_views
 from vslam_ref.geometry.multiview.two_views import Choice, Draws
+from vslam_ref.geometry.multiview.two_views.choice import RATIO
 from vslam_ref.geometry.multiview.two_views.consensus import ONE_EQUATION, truncated_cost
 from vslam_ref.systems.visual_map.keyframe_map import KeyframeMap
 from vslam_ref.systems.visual_map.telling import Attempt
@@ -80,12 +81,13 @@ class Pair(NamedTuple):
 class Between(NamedTuple):
     """A picture between: its number, where the matches lie in it (n, 2), pixels, NaN where not seen.
 
-    ``share`` of the way that it lies behind the first.
+    ``share`` of the way that it lies behind the first; it may cost ``agree`` times as much as the pair.
     """
 
     number: int
     uv: Array
     share: float
+    agree: float = RATIO
 
 
 def judge_start(
@@ -108,7 +110,8 @@ def _asked(camera: Camera, pair: Pair, choice: Choice, between: Between) -> Thir
     """Let a picture between decide between the cheapest answers of the pair."""
     seen = np.isfinite(between.uv[:, 0])
     a, m, b = (camera.unproject(uv[seen]).xn for uv in (pair.uv_a, between.uv, pair.uv_b))
-    return ask_third(choice.answers[:ANSWERS], a, m, b, sigma=one_pixel(camera), share=between.share)
+    sigma, share, agree = one_pixel(camera), between.share, between.agree
+    return ask_third(choice.answers[:ANSWERS], a, m, b, sigma=sigma, share=share, agree=agree)
 
 
 def _judged(

@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.geometry import camera_pose, se3
 
+FIRST = "the first picture"
+"""Why nothing is tried with it."""
+
 
 class Quality(Enum):
     """How well a picture was tracked."""

@@ -14,7 +14,7 @@ from vslam_ref.systems.visual_map import shared_points
 def unproven(feature_map: FeatureMap, newest: int, s: MapperSettings) -> IntArray:
     """Young points that were found too seldom where they were expected, or are seen by too few keyframes.
 
-    Implements A§3.1, the choice of points.
+    Implements A§3.1, the choice of points; those of the start count as proven.
     """
     table = feature_map.points
     age = newest - table["born"]

@@ -31,7 +31,8 @@ class Side(NamedTuple):
     """Features of a keyframe that show no point.
 
     ``row (n,)`` among its features; ``uv (n, 2)`` pixels; their rays ``bearing (n, 3)`` and
-    ``J_pixel (n, 3, 2)``, d bearing / d pixel; ``width (n,)`` of their octave's pixel; ``descriptor (n, 32)``.
+    ``J_pixel (n, 3, 2)``, d bearing / d pixel; ``width (n,)`` of a pixel of their octave;
+    ``descriptor (n, 32)``.
     """
 
     row: IntArray

@@ -25,7 +25,7 @@ def local_points(feature_map: FeatureMap, seen: IntArray, s: TrackerSettings) ->
 
 
 def local_keyframes(feature_map: FeatureMap, seen: IntArray, most: int) -> IntArray:
-    """Keyframes that see some of these points (n,), and for each one more neighbour, its children, its parent.
+    """Keyframes that see some of these points (n,), and a neighbour, a child and the parent of each.
 
     Those that see most points come first, ``most`` in all.
     """

@@ -42,7 +42,7 @@ def follow_known(before: PreparedPicture, now: PreparedPicture, known: Known, ra
 def by_three_points(
     camera: Camera, X_world: Array, known: Known, rng: np.random.Generator
 ) -> AgreedPose | None:
-    """Pose from three followed points (n, 3) with which most of all agree, the map's own unit; None without."""
+    """Pose from three followed points (n, 3), own unit, with which most agree; None if few do."""
     return pose_by_three_points(camera, X_world, known.uv, rng, sigma_px=level_sigma(known.level))
 
 

@@ -1,0 +1,76 @@
+"""``vslam-ref run orbslam``: its numbers and files, and a scene that allows no start."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2", reason="pictures and films need OpenCV")
+
+import cv2
+
+from vslam_ref import cli
+from vslam_ref.datasets import trajectories
+
+QUICK = ["--set", "features.features=600", "--set", "features.octaves=4"]
+
+
+def test_a_run_leaves_paths_map_and_numbers(tmp_path: Path) -> None:
+    out, numbers = tmp_path / "out", tmp_path / "n.json"
+    words = [
+        "run",
+        "orbslam",
+        "desk",
+        "--to",
+        "90",
+        "--every",
+        "5",
+        "--out",
+        str(out),
+        "--json",
+        str(numbers),
+    ]
+    assert cli.main([*words, *QUICK, "--video", "none"]) == 0
+    told = json.loads(numbers.read_text())
+    assert told["system"] == "orbslam"
+    assert told["tracked"] == told["frames"] == 18
+    assert (told["loops"], told["loops_rejected"], told["essential_edges"]) == (0, 0, 0)
+    assert told["culled_keyframes"] >= 0
+    assert told["settings"]["features.octaves"] == {"value": 4, "default": 8}
+    assert told["ate_percent"] < 2.0  # half a pixel in some hundred points of a path of half a metre
+    assert {path.name for path in out.iterdir()} == {
+        *("result.json", "report.html", "trajectory.txt", "trajectory_live.txt", "keyframes.txt", "map.ply"),
+        *("map.png", "course.png", "stages.png"),
+    }
+    keyframes = trajectories.read(out / "keyframes.txt").trajectory
+    assert len(keyframes) == told["keyframes"]
+    whole = trajectories.read(out / "trajectory.txt").trajectory
+    rows = np.searchsorted(whole.times, keyframes.times)
+    np.testing.assert_allclose(whole.t_world_body[rows], keyframes.t_world_body, atol=1e-12)
+    assert "ORB-SLAM on desk" in (out / "report.html").read_text()
+
+
+def test_a_bare_scene_ends_without_a_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "bare"
+    folder.mkdir()
+    for k in range(4):
+        cv2.imwrite(str(folder / f"{k:03d}.png"), np.full((120, 160), 90 + k, np.uint8))
+    (folder / "calib.txt").write_text("120 120 79.5 59.5 160 120\n")
+    out, numbers = tmp_path / "out", tmp_path / "n.json"
+    words = ["run", "orbslam", str(folder), "--camera", str(folder / "calib.txt"), "--rate", "10"]
+    assert cli.main([*words, "--out", str(out), "--json", str(numbers), "--video", "none"]) == 0
+    told = json.loads(numbers.read_text())
+    assert told["no_start"]
+    assert told["tracked"] == told["keyframes"] == 0
+    assert "note: no start:" in capsys.readouterr().out
+    assert not (out / "trajectory.txt").exists()
+
+
+def test_a_setting_that_means_nothing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", "orbslam", "desk", "--out", str(tmp_path / "out"), "--set", "tracker.local_map=near"]
+    assert cli.main(words) == 2
+    assert "need whole or covisible" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

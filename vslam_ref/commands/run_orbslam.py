@@ -1,0 +1,45 @@
+"""``vslam-ref run orbslam``: features that are recognised, a map that is thinned out."""
+
+from __future__ import annotations
+
+import argparse
+
+from vslam_ref.commands import run_visual
+
+SYSTEMS = {"orbslam": "ORB-SLAM: the same with features that are recognised, and a map that is thinned out"}
+START = """\
+loops, loops_rejected, essential_edges, culled_keyframes: loops that were closed and that were refused, edges
+of the graph that closing moves, keyframes that added nothing to others.
+
+--start I,J: the features of picture I are matched with those of J, and one start is tried there: it holds, or
+the run ends without a map and says why. Pictures between both are tracked afterwards; those before I are not.
+
+'--set features.features=2000' changes a setting. Parts are left out so: features.spread=false (features
+where corners are strongest), mapper.fuse=false (points made twice stay two), mapper.local_steps=0 (no
+adjustment after a keyframe), mapper.redundant=1 (no keyframe is culled)."""
+EPILOG = "\n\n".join([run_visual.SOURCE, run_visual.NUMBERS, START, run_visual.REST])
+EXAMPLES = """\
+examples, after 'vslam-ref sample video --out samples':
+  vslam-ref run orbslam samples/video --out out/orb
+with a rendered scene, which has its own camera and truth:
+  vslam-ref run orbslam corridor --to 150 --out out/orb-corridor
+with your own pictures:
+  vslam-ref run orbslam walk.mp4 --camera camera.yaml --out out/orb-walk
+and with known data sets:
+  vslam-ref run orbslam new_tsukuba_150 --out out/orb-tsukuba --json tsukuba.json
+  vslam-ref run orbslam kitti07_head --refine-camera --out out/orb-kitti"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of this system."""
+    run_visual.add_arguments(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run ORB-SLAM over the pictures."""
+    from vslam_ref.experiments.visual_slam.kinds import ORBSLAM
+    from vslam_ref.support.config import apply_overrides
+    from vslam_ref.systems.orbslam import Settings
+
+    words = [*options.set, *(["camera.refine=true"] * options.refine_camera)]
+    return run_visual.run(options, ORBSLAM, apply_overrides(Settings(), words))

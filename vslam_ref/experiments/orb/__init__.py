@@ -1,0 +1,1 @@
+"""How the table of ORB's pairs was learned: ``python -m vslam_ref.experiments.orb.learned_pairs``."""
