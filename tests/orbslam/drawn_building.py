@@ -93,7 +93,7 @@ def draw_walk(
     drift: float = 1.25,
     look_alike: bool = False,
 ) -> Walk:
-    """Walk, and map.  ``look_alike``: the third side has the descriptors of the first one, elsewhere on it."""
+    """Walk, and map.  ``look_alike``: the third side has descriptors of the first one, elsewhere on it."""
     rng = np.random.default_rng(seed)
     true, X = walk_poses(laps), wall_points(rng, density)
     word = rng.integers(0, 256, (len(X), 32), dtype=np.uint8)

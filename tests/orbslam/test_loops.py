@@ -17,8 +17,9 @@ from vslam_ref.geometry import se3, sim3, so3
 from vslam_ref.systems.orbslam import spanning_tree
 from vslam_ref.systems.orbslam.loops import CandidatesByWords, LoopCloser, LoopSettings
 from vslam_ref.systems.orbslam.loops.consistency import Consistency
-from vslam_ref.systems.orbslam.loops.join import join
+from vslam_ref.systems.orbslam.loops.join import join, rescaled
 from vslam_ref.systems.orbslam.loops.verify import camera_at, matched, verify
+from vslam_ref.systems.visual_map.telling import Pose
 
 
 def load() -> ModuleType:
@@ -61,6 +62,8 @@ def test_the_loop_is_closed_and_the_drift_is_gone(seed: int) -> None:
     assert closer.closed[0].current == first + 2  # three in a row
     assert walk.map.loop_edges == [(closer.closed[0].candidate, closer.closed[0].current)]
     assert not closer.rejected
+    assert closer.counts()["loops"] == 1
+    assert closer.counts()["essential_edges"] > len(walk.true)
     # features are exact, so that the adjustment of everything ends at the truth, as near as its rule for the
     # end lets it: a step that no pixel shows (1e-2 of the scale of the errors, 0.5 px, over 300 px a radian)
     assert before > 0.25
@@ -76,7 +79,8 @@ def test_without_the_adjustment_the_correction_alone_takes_most_of_the_drift() -
     # the unit of each keyframe had grown, and comes back to that of the first one, which is held: as well as
     # a keyframe has one unit, for its points are the means of those of ten keyframes
     current = closer.closed[0].current
-    np.testing.assert_allclose(closer.scale[: current + 1] * walk.scale[: current + 1], 1.0, rtol=0.05)
+    assert closer.joined is not None
+    np.testing.assert_allclose(closer.joined.scale[: current + 1] * walk.scale[: current + 1], 1.0, rtol=0.05)
     assert walk.scale[current] > 1.2
 
 
@@ -121,6 +125,14 @@ def test_a_walk_with_look_alikes_closes_the_true_loop_only() -> None:
     assert closer.closed[0].candidate < 14
     assert sum(closer.rejected.values()) >= 5
     assert walk.ate() < 1e-3
+
+
+def test_poses_kept_beside_the_map_get_its_new_lengths() -> None:
+    poses = {7: Pose(7, 1, se3.exp([1.0, 2.0, 3.0, 0.1, 0.2, 0.3]), None), 9: Pose(9, 0, np.eye(4), None)}
+    found = rescaled(poses, np.array([1.0, 0.5]))
+    np.testing.assert_array_equal(found[7].T_cam_kf[:3, 3], 0.5 * poses[7].T_cam_kf[:3, 3])
+    np.testing.assert_array_equal(found[7].T_cam_kf[:3, :3], poses[7].T_cam_kf[:3, :3])
+    np.testing.assert_array_equal(found[9].T_cam_kf, np.eye(4))
 
 
 def test_the_similarity_is_the_true_one() -> None:

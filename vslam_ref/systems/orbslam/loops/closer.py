@@ -62,14 +62,26 @@ class LoopCloser:
     joined: Joined | None = None
     _consistency: Consistency = field(default_factory=Consistency)
 
-    def __call__(self, feature_map: FeatureMap, kf: int) -> bool:
-        """Look at a new keyframe; return whether a loop was closed, so that the map has moved."""
+    def __call__(self, feature_map: FeatureMap, kf: int) -> Array | None:
+        """Look at a new keyframe, and close a loop if there is one.
+
+        Parameters
+        ----------
+        feature_map : FeatureMap
+        kf : int
+
+        Returns
+        -------
+        ndarray, shape (K,), or None
+            By which lengths near each keyframe have changed, a ratio, if a loop was closed: whoever keeps
+            poses relative to keyframes changes them so.
+        """
         proposed = [int(c) for c in self.candidates(feature_map, kf)]
         near, alive = feature_map.covisible(kf), feature_map.keyframes["alive"]
         proposed = [c for c in proposed if c != kf and alive[c] and near[c] == 0]
         if self.closed and kf < self.closed[-1].current + self.loops.apart:
             self._consistency.forget()
-            return False
+            return None
         for candidate in self._consistency.take(feature_map, proposed, self.loops.consistent):
             verdict = verify(feature_map, kf, candidate, self.rng, self.loops)
             if verdict.reason:
@@ -80,10 +92,14 @@ class LoopCloser:
             self._consistency.forget()
             if self.loops.last_steps:
                 adjust_all(feature_map, self.settings, self.loops.last_steps)
-            return True
-        return False
+            return self.joined.scale
+        return None
 
-    @property
-    def scale(self) -> Array:
-        """By which the last closing changed lengths near each keyframe, (K,), a ratio."""
-        return np.ones(0) if self.joined is None else self.joined.scale
+    def counts(self) -> dict[str, int]:
+        """Loops that were closed, candidates that were rejected, edges of the last essential graph."""
+        edges = 0 if self.joined is None else self.joined.edges
+        return {
+            "loops": len(self.closed),
+            "loops_rejected": sum(self.rejected.values()),
+            "essential_edges": edges,
+        }

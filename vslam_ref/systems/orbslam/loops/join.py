@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from vslam_ref.systems.orbslam.loops.correction import Correction, Loop, close_l
 from vslam_ref.systems.orbslam.loops.settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.verify import Verdict, points_around
 from vslam_ref.systems.orbslam.mapper.fuse import fuse
+from vslam_ref.systems.visual_map.telling import Pose
 
 
 class Joined(NamedTuple):
@@ -91,6 +93,16 @@ def join(feature_map: FeatureMap, verdict: Verdict, s: LoopSettings) -> Joined:
     feature_map.refresh(points)
     feature_map.version += 1
     return Joined(found, scale, len(edges.tail) + 1 + len(pairs), alive_before - len(points))
+
+
+def rescaled(poses: Mapping[int, Pose], scale: Array) -> dict[int, Pose]:
+    """Poses relative to keyframes, with lengths changed as near these: ``scale (K,)``, a ratio."""
+    return {
+        number: pose._replace(
+            T_cam_kf=se3.from_rt(pose.T_cam_kf[:3, :3], scale[pose.kf] * pose.T_cam_kf[:3, 3])
+        )
+        for number, pose in poses.items()
+    }
 
 
 def _edges(feature_map: FeatureMap, used: IntArray, shared: IntArray, s: LoopSettings) -> EssentialEdges:

@@ -25,6 +25,7 @@ import numpy as np
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.similarity import PointMatches, agreeing, estimate_similarity, refine_similarity
 from vslam_ref.features import hamming
+from vslam_ref.features.orb import OrbFeatures
 from vslam_ref.features.vocabulary import turned_alike
 from vslam_ref.geometry import se3, sim3
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
@@ -145,38 +146,39 @@ def guided(
     """
     shown = [feature_map.point_of(kf) for kf in (current, other)]
     free = [np.setdiff1d(np.flatnonzero(p >= 0), taken) for p, taken in zip(shown, pairs, strict=True)]
-    there = _seen_in(
-        feature_map, current, shown[1][free[1]], camera_at(S_other_current, feature_map, other), free[0], s
-    )
-    back = _seen_in(
-        feature_map,
-        other,
-        shown[0][free[0]],
+    poses = (
+        camera_at(S_other_current, feature_map, other),
         camera_at(sim3.inverse(S_other_current), feature_map, current),
-        free[1],
-        s,
     )
+    wide, bits = s.guided_radius, s.guided_bits
+    there = _found(feature_map, current, shown[1][free[1]], poses[0], free[0], wide, bits)
+    back = _found(feature_map, other, shown[0][free[0]], poses[1], free[1], wide, bits)
+    answer = dict(zip(*(values.tolist() for values in back), strict=True))
     of_point = {int(p): int(f) for f, p in zip(free[1], shown[1][free[1]], strict=True)}
-    agreed = [(f, of_point[p]) for p, f in there.items() if back.get(int(shown[0][f])) == of_point[p]]
+    agreed = [
+        (f, of_point[p])
+        for p, f in zip(*(values.tolist() for values in there), strict=True)
+        if answer.get(int(shown[0][f])) == of_point[p]
+    ]
     found = np.array(sorted(agreed), dtype=np.int64).reshape(-1, 2)
     return Pairs(found[:, 0], found[:, 1])
 
 
-def _seen_in(
-    feature_map: FeatureMap, kf: int, points: IntArray, T_cam_world: Array, free: IntArray, s: LoopSettings
-) -> dict[int, int]:
-    """Feature of a keyframe, of those that are free, for each point that is found from a pose."""
+def _found(
+    feature_map: FeatureMap,
+    kf: int,
+    points: IntArray,
+    T_cam_world: Array,
+    free: IntArray,
+    radius: float,
+    limit: int,
+) -> tuple[IntArray, IntArray]:
+    """Points found from a pose in a keyframe, and the features, of those that are free, that show them."""
     at = expected(feature_map, points, T_cam_world)
-    feature = find(
-        feature_map,
-        at,
-        features_of(feature_map, kf),
-        radius=s.guided_radius,
-        limit=s.guided_bits,
-        free=free,
-    )
+    features = OrbFeatures._make(values[free] for values in features_of(feature_map, kf))
+    feature = find(feature_map, at, features, radius=radius, limit=limit)
     good = feature >= 0
-    return dict(zip(at.point[good].tolist(), feature[good].tolist(), strict=True))
+    return at.point[good], free[feature[good]]
 
 
 def camera_at(S_seen_by: Array, feature_map: FeatureMap, kf: int) -> Array:
@@ -198,12 +200,10 @@ def whole_place(
     known = feature_map.point_of(candidate)[pairs.other]
     points = np.setdiff1d(points_around(feature_map, candidate), known)
     points = np.setdiff1d(points, feature_map.measured_in(current))
-    at = expected(feature_map, points, camera_at(S, feature_map, candidate))
-    features = features_of(feature_map, current)
-    free = np.setdiff1d(np.arange(len(features.uv)), pairs.current)
-    feature = find(feature_map, at, features, radius=s.wide_radius, limit=s.bits, free=free)
-    good = feature >= 0
-    return np.concatenate([pairs.current, feature[good]]), np.concatenate([known, at.point[good]])
+    free = np.setdiff1d(np.arange(len(feature_map.point_of(current))), pairs.current)
+    camera = camera_at(S, feature_map, candidate)
+    more, feature = _found(feature_map, current, points, camera, free, s.wide_radius, s.bits)
+    return np.concatenate([pairs.current, feature]), np.concatenate([known, more])
 
 
 def points_around(feature_map: FeatureMap, kf: int) -> IntArray:
