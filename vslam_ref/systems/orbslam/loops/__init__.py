@@ -16,7 +16,7 @@ module            holds
 
 from vslam_ref.systems.orbslam.loops.closer import Candidates, LoopCloser
 from vslam_ref.systems.orbslam.loops.settings import LoopSettings
-from vslam_ref.systems.orbslam.loops.verify import Verdict
+from vslam_ref.systems.orbslam.loops.verify import LoopVerdict
 from vslam_ref.systems.orbslam.loops.words import CandidatesByWords
 
-__all__ = ["Candidates", "CandidatesByWords", "LoopCloser", "LoopSettings", "Verdict"]
+__all__ = ["Candidates", "CandidatesByWords", "LoopCloser", "LoopSettings", "LoopVerdict"]

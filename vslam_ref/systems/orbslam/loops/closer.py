@@ -21,7 +21,7 @@ from vslam_ref.systems.orbslam.feature_map import FeatureMap
 from vslam_ref.systems.orbslam.loops.consistency import Consistency
 from vslam_ref.systems.orbslam.loops.join import Joined, join
 from vslam_ref.systems.orbslam.loops.settings import LoopSettings
-from vslam_ref.systems.orbslam.loops.verify import Verdict, verify
+from vslam_ref.systems.orbslam.loops.verify import LoopVerdict, verify
 from vslam_ref.systems.orbslam.mapper.adjusting import adjust_all
 from vslam_ref.systems.orbslam.settings import Settings
 
@@ -45,7 +45,7 @@ class LoopCloser:
 
     Attributes
     ----------
-    closed : list of Verdict
+    closed : list of LoopVerdict
         Loops that were closed.
     rejected : Counter
         Candidates that were proposed often enough and turned out to be none, by reason.
@@ -57,7 +57,7 @@ class LoopCloser:
     rng: np.random.Generator
     loops: LoopSettings = field(default_factory=LoopSettings)
     settings: Settings = field(default_factory=Settings)
-    closed: list[Verdict] = field(default_factory=list)
+    closed: list[LoopVerdict] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
     joined: Joined | None = None
     _consistency: Consistency = field(default_factory=Consistency)

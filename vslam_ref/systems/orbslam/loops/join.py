@@ -21,7 +21,7 @@ from vslam_ref.systems.orbslam.essential_graph import EssentialEdges, essential_
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
 from vslam_ref.systems.orbslam.loops.correction import Correction, Loop, close_loop, move_points
 from vslam_ref.systems.orbslam.loops.settings import LoopSettings
-from vslam_ref.systems.orbslam.loops.verify import Verdict, points_around
+from vslam_ref.systems.orbslam.loops.verify import LoopVerdict, points_around
 from vslam_ref.systems.orbslam.mapper.fuse import fuse
 from vslam_ref.systems.visual_map.telling import Pose
 
@@ -45,14 +45,14 @@ class Joined(NamedTuple):
     fused: int
 
 
-def join(feature_map: FeatureMap, verdict: Verdict, s: LoopSettings) -> Joined:
+def join(feature_map: FeatureMap, verdict: LoopVerdict, s: LoopSettings) -> Joined:
     """Close a loop in the map, all but the adjustment of everything.
 
     Parameters
     ----------
     feature_map : FeatureMap
         Changed in place.
-    verdict : Verdict
+    verdict : LoopVerdict
         A loop.
     s : LoopSettings
 
@@ -114,7 +114,7 @@ def _edges(feature_map: FeatureMap, used: IntArray, shared: IntArray, s: LoopSet
     return essential_edges(shared[np.ix_(used, used)], parent, loops, theta_min=s.theta_min)
 
 
-def _place(feature_map: FeatureMap, group: IntArray, verdict: Verdict) -> None:
+def _place(feature_map: FeatureMap, group: IntArray, verdict: LoopVerdict) -> None:
     """Put a group of keyframes where the loop says, and the points they see with them."""
     T, c = feature_map.T_kf_world, verdict.candidate
     # from the world as the group has it to the world as the candidate has it
@@ -125,7 +125,7 @@ def _place(feature_map: FeatureMap, group: IntArray, verdict: Verdict) -> None:
     feature_map.X_world[points] = sim3.act(move, feature_map.X_world[points])
 
 
-def _fuse(feature_map: FeatureMap, group: IntArray, verdict: Verdict, s: LoopSettings) -> None:
+def _fuse(feature_map: FeatureMap, group: IntArray, verdict: LoopVerdict, s: LoopSettings) -> None:
     """Make one point of two: those of the loop's own pairs, then those that the group's pictures show."""
     shown = feature_map.point_of(verdict.current)[verdict.feature]
     has = shown >= 0

@@ -34,14 +34,14 @@ from vslam_ref.systems.orbslam.mapper.fuse import features_of
 from vslam_ref.systems.orbslam.projection import expected, find
 
 
-class Pairs(NamedTuple):
+class FeaturePairs(NamedTuple):
     """Features that show one point: ``current (n,)`` of the current keyframe, ``other (n,)`` of the other."""
 
     current: IntArray
     other: IntArray
 
 
-class Verdict(NamedTuple):
+class LoopVerdict(NamedTuple):
     """Whether two keyframes show one place.
 
     Attributes
@@ -71,7 +71,7 @@ class Verdict(NamedTuple):
 
 def verify(
     feature_map: FeatureMap, current: int, candidate: int, rng: np.random.Generator, s: LoopSettings
-) -> Verdict:
+) -> LoopVerdict:
     """Judge whether a candidate shows the place of the current keyframe.
 
     Parameters
@@ -83,11 +83,11 @@ def verify(
 
     Returns
     -------
-    Verdict
+    LoopVerdict
     """
     pairs = matched(feature_map, current, candidate, s)
     count = len(pairs.current)
-    told = Verdict(current, candidate, "", count)
+    told = LoopVerdict(current, candidate, "", count)
     if count < s.least_matches:
         return told._replace(reason="few matches")
     both = point_matches(feature_map, current, candidate, pairs)
@@ -96,9 +96,9 @@ def verify(
         return told._replace(reason="no similarity")
     if first.inliers.sum() < s.least_inliers:
         return told._replace(reason="few inliers", inliers=int(first.inliers.sum()))
-    pairs = Pairs(*(side[first.inliers] for side in pairs))
+    pairs = FeaturePairs(*(side[first.inliers] for side in pairs))
     more = guided(feature_map, current, candidate, first.S_b_a, pairs, s)
-    pairs = Pairs(*(np.concatenate(sides) for sides in zip(pairs, more, strict=True)))
+    pairs = FeaturePairs(*(np.concatenate(sides) for sides in zip(pairs, more, strict=True)))
     both = point_matches(feature_map, current, candidate, pairs)
     S = refine_similarity(both, first.S_b_a).x
     good = agreeing(S, both)
@@ -107,13 +107,13 @@ def verify(
         return told._replace(reason="few inliers")
     S = refine_similarity(both.only(good), S).x
     feature, point = whole_place(
-        feature_map, current, candidate, S, Pairs(*(side[good] for side in pairs)), s
+        feature_map, current, candidate, S, FeaturePairs(*(side[good] for side in pairs)), s
     )
     told = told._replace(points=len(point), S_candidate_current=S, feature=feature, point=point)
     return told if len(point) >= s.least_points else told._replace(reason="few points")
 
 
-def matched(feature_map: FeatureMap, current: int, other: int, s: LoopSettings) -> Pairs:
+def matched(feature_map: FeatureMap, current: int, other: int, s: LoopSettings) -> FeaturePairs:
     """Features of two keyframes that show points and are described alike."""
     rows = [feature_map.rows_in(kf) for kf in (current, other)]
     seen = feature_map.sightings
@@ -122,10 +122,10 @@ def matched(feature_map: FeatureMap, current: int, other: int, s: LoopSettings) 
     a, b = rows[0][found.first], rows[1][found.second]
     alike = turned_alike(seen["angle"][a], seen["angle"][b]) & (seen["point"][a] != seen["point"][b])
     starts = feature_map.keyframes["start"]
-    return Pairs(a[alike] - starts[current], b[alike] - starts[other])
+    return FeaturePairs(a[alike] - starts[current], b[alike] - starts[other])
 
 
-def point_matches(feature_map: FeatureMap, current: int, other: int, pairs: Pairs) -> PointMatches:
+def point_matches(feature_map: FeatureMap, current: int, other: int, pairs: FeaturePairs) -> PointMatches:
     """Points that pairs of features show, in the frames of their keyframes, each in its own unit."""
     X, uv, sigma = [], [], []
     for kf, feature in zip((current, other), pairs, strict=True):
@@ -138,8 +138,13 @@ def point_matches(feature_map: FeatureMap, current: int, other: int, pairs: Pair
 
 
 def guided(
-    feature_map: FeatureMap, current: int, other: int, S_other_current: Array, pairs: Pairs, s: LoopSettings
-) -> Pairs:
+    feature_map: FeatureMap,
+    current: int,
+    other: int,
+    S_other_current: Array,
+    pairs: FeaturePairs,
+    s: LoopSettings,
+) -> FeaturePairs:
     """More pairs: points of each keyframe where the similarity puts them in the other, found both ways.
 
     ``S_other_current (4, 4)``, translation in the unit of the other.
@@ -161,7 +166,7 @@ def guided(
         if answer.get(int(shown[0][f])) == of_point[p]
     ]
     found = np.array(sorted(agreed), dtype=np.int64).reshape(-1, 2)
-    return Pairs(found[:, 0], found[:, 1])
+    return FeaturePairs(found[:, 0], found[:, 1])
 
 
 def _found(
@@ -191,7 +196,7 @@ def camera_at(S_seen_by: Array, feature_map: FeatureMap, kf: int) -> Array:
 
 
 def whole_place(
-    feature_map: FeatureMap, current: int, candidate: int, S: Array, pairs: Pairs, s: LoopSettings
+    feature_map: FeatureMap, current: int, candidate: int, S: Array, pairs: FeaturePairs, s: LoopSettings
 ) -> tuple[IntArray, IntArray]:
     """Features of the current keyframe, and the points that they show of the candidate and its neighbours.
 
