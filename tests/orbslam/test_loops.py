@@ -232,7 +232,7 @@ def test_words_propose_the_place_of_the_first_lap() -> None:
     )
     words = CandidatesByWords(vocabulary)
     for kf in range(len(walk.true)):
-        assert not walk.map.covisible(kf)[words(walk.map, kf)].any()
+        assert (walk.map.covisible(kf)[words(walk.map, kf)] < 15).all()
     closer = walked(walk, CandidatesByWords(vocabulary))
     assert len(closer.closed) == 1
     assert closer.closed[0].candidate < 12
@@ -250,15 +250,17 @@ class Groups:
 
 def test_three_in_a_row_that_touch_are_believed() -> None:
     state, touching = Consistency(), Groups()
-    assert state.take(touching, [10, 50], 3) == []  # type: ignore[arg-type]
-    assert state.take(touching, [12], 3) == []  # type: ignore[arg-type]
-    assert state.take(touching, [50, 15], 3) == [15]  # type: ignore[arg-type]
-    assert state.take(touching, [52], 3) == []  # type: ignore[arg-type]
-    assert state.take(touching, [], 3) == []  # type: ignore[arg-type]
-    assert state.take(touching, [52], 3) == []  # type: ignore[arg-type]
-    assert state.take(touching, [52], 2) == [52]  # type: ignore[arg-type]
+    assert state.take(touching, [10, 50], 3, 15) == []  # type: ignore[arg-type]
+    assert state.take(touching, [12], 3, 15) == []  # type: ignore[arg-type]
+    assert state.take(touching, [50, 15], 3, 15) == [15]  # type: ignore[arg-type]
+    assert state.take(touching, [52], 3, 15) == []  # type: ignore[arg-type]
+    assert state.take(touching, [], 3, 15) == []  # type: ignore[arg-type]
+    assert state.take(touching, [52], 3, 15) == []  # type: ignore[arg-type]
+    assert state.take(touching, [52], 2, 15) == [52]  # type: ignore[arg-type]
+    assert state.take(touching, [52], 2, 21) == [52]  # itself, again
+    assert state.take(touching, [53], 2, 21) == []  # nobody shares as many as 21  # type: ignore[arg-type]
     state.forget()
-    assert state.take(touching, [52], 2) == []  # type: ignore[arg-type]
+    assert state.take(touching, [52], 2, 15) == []  # type: ignore[arg-type]
 
 
 def test_a_loop_twice_joined_adds_no_second_edge() -> None:

@@ -78,11 +78,13 @@ class LoopCloser:
         """
         proposed = [int(c) for c in self.candidates(feature_map, kf)]
         near, alive = feature_map.covisible(kf), feature_map.keyframes["alive"]
-        proposed = [c for c in proposed if c != kf and alive[c] and near[c] == 0]
+        proposed = [c for c in proposed if c != kf and alive[c] and near[c] < self.loops.group]
         if self.closed and kf < self.closed[-1].current + self.loops.apart:
             self._consistency.forget()
             return None
-        for candidate in self._consistency.take(feature_map, proposed, self.loops.consistent):
+        for candidate in self._consistency.take(
+            feature_map, proposed, self.loops.consistent, self.loops.group
+        ):
             verdict = verify(feature_map, kf, candidate, self.rng, self.loops)
             if verdict.reason:
                 self.rejected[verdict.reason] += 1

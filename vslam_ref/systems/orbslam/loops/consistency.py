@@ -2,7 +2,7 @@
 
 ::
 
-    keyframe k - 2   proposes  a          group of a: a and the keyframes that share points with it
+    keyframe k - 2   proposes  a          group of a: a and the keyframes that share many points with it
     keyframe k - 1   proposes  b          group of b meets the group of a: two in a row
     keyframe k       proposes  c, d       group of c meets that of b: three; d meets none: one
                      believed: c
@@ -26,11 +26,14 @@ class Consistency:
 
     groups: list[tuple[frozenset[int], int]] = field(default_factory=list)
 
-    def take(self, feature_map: FeatureMap, candidates: Iterable[int], wanted: int) -> list[int]:
-        """Take the candidates of the next keyframe; return those that ``wanted`` in a row have proposed."""
+    def take(self, feature_map: FeatureMap, candidates: Iterable[int], wanted: int, least: int) -> list[int]:
+        """Take the candidates of the next keyframe; return those that ``wanted`` in a row have proposed.
+
+        Neighbours share ``least`` points.
+        """
         groups, believed = [], []
         for candidate in candidates:
-            group = group_of(feature_map, candidate)
+            group = group_of(feature_map, candidate, least)
             row = 1 + max((count for other, count in self.groups if group & other), default=0)
             groups.append((group, row))
             if row >= wanted:
@@ -43,6 +46,6 @@ class Consistency:
         self.groups = []
 
 
-def group_of(feature_map: FeatureMap, kf: int) -> frozenset[int]:
-    """Return a keyframe and all that share a point with it."""
-    return frozenset([kf, *np.flatnonzero(feature_map.covisible(kf)).tolist()])
+def group_of(feature_map: FeatureMap, kf: int, least: int) -> frozenset[int]:
+    """Return a keyframe and all that share ``least`` points with it."""
+    return frozenset([kf, *np.flatnonzero(feature_map.covisible(kf) >= least).tolist()])

@@ -141,9 +141,9 @@ def _fuse(feature_map: FeatureMap, group: IntArray, verdict: LoopVerdict, s: Loo
 def _new_pairs(
     before: IntArray, after: IntArray, group: IntArray, used: IntArray, s: LoopSettings
 ) -> IntArray:
-    """Pairs of the group and another keyframe that share points only now, and many, (L, 2)."""
+    """Pairs of the group and another keyframe that share many points only now, (L, 2)."""
     others = np.setdiff1d(used, group)
-    new = (after[np.ix_(group, others)] >= s.theta_min) & (before[np.ix_(group, others)] == 0)
+    new = (after[np.ix_(group, others)] >= s.theta_min) & (before[np.ix_(group, others)] < s.group)
     row, column = np.nonzero(new)
     return np.column_stack([group[row], others[column]]).astype(np.int64)
 

@@ -25,7 +25,9 @@ class LoopSettings:
     least_inliers: int = assume(20, "points", "that agree on the similarity; ORB-SLAM's")
     wide_radius: float = assume(10.0, "px of the octave", "around the points of the whole place; ORB-SLAM's")
     least_points: int = assume(40, "points", "of the whole place found again; ORB-SLAM's")
-    group: int = assume(15, "points", "shared by keyframes that are moved as one; ORB-SLAM's")
+    group: int = assume(
+        15, "points", "shared by neighbours, which are no candidates, and move as one; ORB-SLAM's"
+    )
     fuse_radius: float = assume(4.0, "px of the octave", "where points of both visits become one; ORB-SLAM's")
     theta_min: int = assume(100, "points", "shared by the pairs of the essential graph; ORB-SLAM's")
     steps: int = assume(20, "", "of the pose graph; ORB-SLAM's")

@@ -3,7 +3,7 @@
 ::
 
     least   the smallest score of the keyframe with those that share points with it
-    found   keyframes that share words with it, no point, enough words, a score of at least ``least``
+    found   keyframes that share words with it, hardly a point, enough words, a score of at least ``least``
     groups  the score of each, and of those among its ten best neighbours that were found: added up
     best    of each group of at least 0.75 of the best group's score, the keyframe with the best score
 """
@@ -48,7 +48,7 @@ class CandidatesByWords:
         near = [k for k in np.flatnonzero(shared >= SHARED).tolist() if k in self._entry]
         least = min((score(now, self.index.bag(self._entry[k])) for k in near), default=0.0)
         keyframe = np.array(self._keyframe, dtype=np.int64)
-        found = self.index.query(now, (shared[keyframe] == 0) & feature_map.keyframes["alive"][keyframe])
+        found = self.index.query(now, (shared[keyframe] < SHARED) & feature_map.keyframes["alive"][keyframe])
         good = (found.common > COMMON * found.common.max(initial=0)) & (found.score >= max(least, 1e-12))
         of = dict(zip(keyframe[found.entry[good]].tolist(), found.score[good].tolist(), strict=True))
         total: dict[int, float] = {}
