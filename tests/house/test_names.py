@@ -32,6 +32,10 @@ NAMED_TWICE = {
     "Match": "of a scan with a map; of a patch with a picture, in the book of tracking",
     "Point": "of a path in an experiment; of a map, in the books of tracking and of mapping",
     "Run": "what one run of an experiment gave; no module sees two of them",
+    **dict.fromkeys(
+        ("Settings", *(f"{part}Settings" for part in ("Feature", "Start", "Tracker", "Keyframe", "Mapper"))),
+        "of PTAM, and the same parts of ORB-SLAM: no module sees both but by the name of the system",
+    ),
     "Side": "one keyframe of two, in the book of mapping and in the fast module",
     "State": "a filter's means and blocks; how a patch's refinement ended",
     "Step": "of a descent, in the book of features and in least squares",

@@ -40,18 +40,20 @@ def test_a_picture_turned_by_a_right_angle(wall: Bytes) -> None:
 
 
 @pytest.mark.usefixtures("backend")
-def test_cells_without_a_bright_corner_take_the_faint_ones(wall: Bytes) -> None:
-    """Read off cell by cell from all peaks at the lower threshold."""
-    low = detect(wall, 7, 9, suppress=True).xy
-    score = corner_score(wall, low, 9)
+@pytest.mark.parametrize(("noise", "cell"), [(False, 20), (True, 5)])
+def test_cells_without_a_bright_corner_take_the_faint_ones(wall: Bytes, noise: bool, cell: int) -> None:
+    """Read off cell by cell from all peaks at the lower threshold; with noise, many neighbours lie in two."""
+    image = np.random.default_rng(6).integers(60, 160, wall.shape, dtype=np.uint8) if noise else wall
+    low = detect(image, 7, 9, suppress=True).xy
+    score = corner_score(image, low, 9)
     inside = ((low >= 19) & (low < 216 - 19)).all(1)
     low, score = low[inside], score[inside]
     expected = []
     for (x, y), s in zip(low.tolist(), score.tolist(), strict=True):
-        cell = (low // 20 == [x // 20, y // 20]).all(1)
-        if s >= 60 or score[cell].max() < 60:
+        here = (low // cell == [x // cell, y // cell]).all(1)
+        if s >= 60 or score[here].max() < 60:
             expected.append((x, y, s))
-    found = candidates(wall, 60, 7, 20)
+    found = candidates(image, 60, 7, cell)
     assert [(x, y, s) for (x, y), s in zip(found.xy.tolist(), found.score.tolist(), strict=True)] == expected
     assert (found.score < 60).any()
     assert (found.score >= 60).any()

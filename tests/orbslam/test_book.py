@@ -128,6 +128,8 @@ def test_both_are_lost_without_features(draw_map) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_features_are_matched_along_the_same_curves(draw_map, seed: int) -> None:
     made = draw_map(points=24, share=1.0, seed=seed).map
+    made.T_kf_world[4] = se3.compose(se3.exp([0.0, 0, 0, 0, 0, 0.6]), made.T_kf_world[4])  # rolled
+    made.sightings["uv"][made.features(4)][:24] = CAMERA.pixel_from_world(made.T_kf_world[4], made.X_world).uv
     made.remove_points(np.arange(24))  # all features are free again, and their descriptors are random
     rng = np.random.default_rng(seed)
     rows = [made.features(k) for k in (1, 4)]
@@ -138,7 +140,7 @@ def test_features_are_matched_along_the_same_curves(draw_map, seed: int) -> None
     T_b_a = se3.compose(made.T_kf_world[4], se3.inverse(made.T_kf_world[1]))
     octave = made.sightings["level"][rows[0]].tolist()
     corners = [
-        [mapping.Corner(u, k, bits(d)) for u, k, d in zip(side.uv, octave, side.descriptor, strict=True)]
+        [mapping.FreeCorner(u, k, bits(d)) for u, k, d in zip(side.uv, octave, side.descriptor, strict=True)]
         for side in (a, b)
     ]
     i, j = new_points.match(a, b, T_b_a, 1.96, 50)

@@ -163,6 +163,6 @@ def test_an_adjustment_passes_over_culled_keyframes(draw_map):
     for k in (3, 4):
         made.T_kf_world[k] = se3.perturb(truth[k], 0.01 * rng.standard_normal(6))
     adjust(made, Robust(tuned("tukey", 2), "adaptive", 0.4), active=[3, 4], fixed=[0, 1])
-    # the last step is below 1e-2 of what noise of half a pixel moves a pose: 0.5 / 150 over the root of 50 points
+    # the last step is below 1e-2 of what half a pixel moves a pose: 0.5 / 150 over the root of 50 points
     np.testing.assert_allclose(made.T_kf_world[[0, 1, 3, 4]], truth[[0, 1, 3, 4]], atol=1e-4)
     assert (made.T_kf_world[2] == truth[2]).all()

@@ -15,7 +15,7 @@ S = Settings()
 
 def freed(draw_map, seed: int = 0):
     """A map whose points 20 to 59 are taken away again; the same descriptors show them everywhere."""
-    made, sees = draw_map(keyframes=4, points=60, share=1.0, seed=seed)
+    made = draw_map(keyframes=4, points=60, share=1.0, seed=seed).map
     table = made.sightings
     for k in range(1, 4):
         table["descriptor"][made.features(k)][:60] = table["descriptor"][made.features(0)][:60]
@@ -54,6 +54,19 @@ def test_octaves_that_contradict_the_distances_make_no_point(draw_map) -> None:
     new_points.new_points(made, 3, S.mapper, S.features)
     assert made.point_of(3)[30] < 0
     assert made.point_of(3)[31] >= 0
+
+
+def test_octaves_follow_the_distances(draw_map) -> None:
+    """From 1.7 times as far, a point is found three octaves finer, 1.2^3 = 1.73, and not three coarser."""
+    made, X = freed(draw_map)
+    made.T_kf_world[3] = se3.compose(se3.exp([0.0, 0, 2.0, 0, 0, 0]), made.T_kf_world[3])
+    made.sightings["uv"][made.features(3)][:60] = made.camera.pixel_from_world(made.T_kf_world[3], X).uv
+    for k in range(3):
+        made.sightings["level"][made.features(k).start + 30] = 3
+    made.sightings["level"][made.features(3).start + 31] = 3
+    new_points.new_points(made, 3, S.mapper, S.features)
+    assert made.point_of(3)[30] >= 0
+    assert made.point_of(3)[31] < 0
 
 
 def test_points_without_parallax_are_refused(draw_map) -> None:

@@ -55,7 +55,7 @@ def test_the_answer_is_the_first_of_the_nearest(seed: int, backend: str) -> None
 
 
 def test_a_feature_answers_the_nearest_place_only() -> None:
-    """Places 0 to 2 want feature 4: the second is nearest; 3 is too far, 4 not clearly nearest, 5 has none."""
+    """Places 0 to 2 want feature 4, the second is nearest; 3 is too far, 4 not clear, 5 has none."""
     answers = Answers(
         np.array([4, 4, 4, 1, 2, -1]),
         np.array([30, 20, 20, 120, 40, 257]),

@@ -158,18 +158,6 @@ def corner_score(flat, width, xy, arc):
     return score
 
 
-@njit(cache=True)
-def _higher_in_row(xy, score, low, end, x, value):
-    """Whether a corner at x - 1, x or x + 1 has the value or a higher one; the first from x - 1 on."""
-    while low < end and xy[low, 0] < x - 1:
-        low += 1
-    higher, k = False, low
-    while k < end and xy[k, 0] <= x + 1:
-        higher = higher or score[k] >= value
-        k += 1
-    return higher, low
-
-
 @kernel(
     PIXELS,
     types.Array(types.int64, 1, "A", readonly=True),
@@ -178,23 +166,18 @@ def _higher_in_row(xy, score, low, end, x, value):
     returns=types.Array(types.bool_, 1, "C"),
 )
 def is_peak(xy, row_start, width, score):
-    """Twin of :func:`vslam_ref.features.corners._is_peak`."""
-    peak = np.ones(xy.shape[0], np.bool_)
-    rows = row_start.shape[0] - 1
-    for y in range(rows):
-        above, below = row_start[max(y - 1, 0)], row_start[y + 1]
-        for c in range(row_start[y], row_start[y + 1]):
-            x, value = xy[c, 0], score[c]
-            if c > row_start[y] and xy[c - 1, 0] == x - 1 and score[c - 1] >= value:
-                peak[c] = False
-            if c + 1 < row_start[y + 1] and xy[c + 1, 0] == x + 1 and score[c + 1] >= value:
-                peak[c] = False
-            if y > 0:
-                higher, above = _higher_in_row(xy, score, above, row_start[y], x, value)
-                peak[c] = peak[c] and not higher
-            if y + 1 < rows:
-                higher, below = _higher_in_row(xy, score, below, row_start[y + 2], x, value)
-                peak[c] = peak[c] and not higher
+    """Twin of :func:`vslam_ref.features.corners._is_peak`: a map of the scores, with a border of -1."""
+    pitch = width + 2
+    scores = np.full((row_start.shape[0] + 1) * pitch, -1, np.int16)
+    for c in range(xy.shape[0]):
+        scores[(np.int64(xy[c, 1]) + 1) * pitch + xy[c, 0] + 1] = score[c]
+    peak = np.empty(xy.shape[0], np.bool_)
+    for c in range(xy.shape[0]):
+        at = (np.int64(xy[c, 1]) + 1) * pitch + xy[c, 0] + 1
+        most = max(scores[at - 1], scores[at + 1])
+        for row in (at - pitch, at + pitch):
+            most = max(most, max(scores[row], max(scores[row - 1], scores[row + 1])))
+        peak[c] = scores[at] > most
     return peak
 
 

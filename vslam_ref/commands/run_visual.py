@@ -23,7 +23,7 @@ from vslam_ref.commands.options import (
 if TYPE_CHECKING:
     from vslam_ref.datasets.sequences import Sequence
     from vslam_ref.experiments.visual_slam.interrupting import Interrupts
-    from vslam_ref.experiments.visual_slam.kinds import Kind
+    from vslam_ref.experiments.visual_slam.kinds import SystemKind
     from vslam_ref.experiments.visual_slam.running import Run
     from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(options: argparse.Namespace, kind: Kind, settings: Any, *, concurrent: bool = False) -> int:
+def run(options: argparse.Namespace, kind: SystemKind, settings: Any, *, concurrent: bool = False) -> int:
     """Run a system over the pictures, print and write what there is to tell."""
     import time
 

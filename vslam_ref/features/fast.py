@@ -124,8 +124,7 @@ def pixels(xy: ArrayLike, shape: tuple[int, int], before: int, after: int) -> Pi
     at = given.astype(np.int32)
     if at.ndim != 2 or at.shape[1] != 2 or not np.array_equal(at, given):
         raise ValueError(f"xy is {given.dtype} of shape {given.shape}: need whole pixels of shape (n, 2)")
-    x, y = at.T
-    inside = (x >= before) & (x < shape[1] - after) & (y >= before) & (y < shape[0] - after)
+    inside = (at >= before).all(1) & (at < np.array(shape[::-1]) - after).all(1)
     if not inside.all():
         raise ValueError(
             f"pixel {tuple(at[~inside][0].tolist())} of an image of {shape[1]} x {shape[0]}: "

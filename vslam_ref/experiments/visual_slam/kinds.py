@@ -53,7 +53,7 @@ class VisualSystem(Protocol):
         """Points that are followed before there is a map."""
 
 
-class Kind(NamedTuple):
+class SystemKind(NamedTuple):
     """One of the systems.
 
     Attributes
@@ -99,7 +99,7 @@ def _make_orbslam(
     return orbslam.OrbSlam(camera, settings, chosen)
 
 
-PTAM = Kind(
+PTAM = SystemKind(
     "ptam",
     "PTAM",
     ptam.Settings,
@@ -111,7 +111,7 @@ PTAM = Kind(
     (),
     lambda settings: 2.0,
 )
-ORBSLAM = Kind(
+ORBSLAM = SystemKind(
     "orbslam",
     "ORB-SLAM",
     orbslam.Settings,
@@ -131,7 +131,7 @@ ORBSLAM = Kind(
 KINDS = (PTAM, ORBSLAM)
 
 
-def kind_of(settings: Any) -> Kind:
+def kind_of(settings: Any) -> SystemKind:
     """The system whose settings these are.
 
     Examples

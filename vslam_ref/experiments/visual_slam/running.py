@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
-from vslam_ref.experiments.visual_slam.kinds import Kind, VisualSystem, kind_of
+from vslam_ref.experiments.visual_slam.kinds import SystemKind, VisualSystem, kind_of
 from vslam_ref.systems.ptam import ConcurrentPtam
 from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, TrackedPicture
@@ -124,7 +124,7 @@ class Run:
     concurrent: bool = False
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> SystemKind:
         """Which system it is."""
         return kind_of(self.settings)
 

@@ -62,21 +62,21 @@ def descriptor(image: Bytes, x: int, y: int, theta: float, pairs: IntArray) -> l
     return bits
 
 
-class Node:
+class Leaf:
     """A rectangle of the picture: its first pixel, its size, and the corners in it."""
 
     def __init__(self, x: int, y: int, w: int, h: int, corners: list[Corner]) -> None:
         self.x, self.y, self.w, self.h = x, y, w, h
         self.corners = [c for c in corners if x <= c[0] < x + w and y <= c[1] < y + h]
 
-    def four(self) -> list[Node]:
+    def four(self) -> list[Leaf]:
         """Its quarters, those of odd sizes larger on the left and above; empty ones are left out."""
         w, h = (self.w + 1) // 2, (self.h + 1) // 2
         quarters = [
-            Node(self.x, self.y, w, h, self.corners),
-            Node(self.x + w, self.y, self.w - w, h, self.corners),
-            Node(self.x, self.y + h, w, self.h - h, self.corners),
-            Node(self.x + w, self.y + h, self.w - w, self.h - h, self.corners),
+            Leaf(self.x, self.y, w, h, self.corners),
+            Leaf(self.x + w, self.y, self.w - w, h, self.corners),
+            Leaf(self.x, self.y + h, w, self.h - h, self.corners),
+            Leaf(self.x + w, self.y + h, self.w - w, self.h - h, self.corners),
         ]
         return [q for q in quarters if q.corners]
 
@@ -85,7 +85,7 @@ def spread(corners: list[Corner], width: int, height: int, wanted: int) -> list[
     """Split where there are most corners until there are enough nodes, and keep the best of each."""
     squares = max(math.floor(width / height + 0.5), 1)
     edge = [math.ceil(k * width / squares) for k in range(squares + 1)]
-    nodes = [Node(a, 0, b - a, height, corners) for a, b in pairwise(edge)]
+    nodes = [Leaf(a, 0, b - a, height, corners) for a, b in pairwise(edge)]
     nodes = [n for n in nodes if n.corners]
     while len(nodes) < min(wanted, len(corners)):
         fullest = sorted((n for n in nodes if len(n.corners) > 1), key=lambda n: -len(n.corners))

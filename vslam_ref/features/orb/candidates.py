@@ -45,7 +45,12 @@ def candidates(image: Bytes, threshold: int, low_threshold: int, cell: int) -> C
     full[tuple(found.xy.T[::-1] // cell + 1)] = True
     empty = ~full
     empty[:, [0, -1]] = empty[[0, -1]] = False
-    near = np.any([np.roll(empty, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
+    rows = empty.copy()
+    rows[1:] |= empty[:-1]
+    rows[:-1] |= empty[1:]
+    near = rows.copy()  # empty cells and those around them, whose corners are compared with theirs
+    near[:, 1:] |= rows[:, :-1]
+    near[:, :-1] |= rows[:, 1:]
     low = detect(image, low_threshold, ARC)
     more = _peaks(image, low.only(near[tuple(low.xy.T[::-1] // cell + 1)]))
     alone = empty[tuple(more.xy.T[::-1] // cell + 1)]  # eq-orb-cell

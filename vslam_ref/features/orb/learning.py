@@ -59,7 +59,7 @@ def patches(image: ArrayLike, settings: OrbSettings) -> Bytes:
     Returns
     -------
     ndarray of uint8, shape (n, 729)
-        Pixels of ``GRID``.
+        At the offsets ``GRID``, pixels of the octave.
     """
     found = [np.zeros((0, len(GRID)), np.uint8)]
     images = octave_images(image, settings.octaves, settings.scale)
@@ -88,7 +88,7 @@ def learn(patch: Bytes, candidate: IntArray, wanted: int = 256) -> LearnedPairs:
     patch : ndarray of uint8, shape (n, 729)
         As :func:`patches` gives them.
     candidate : ndarray of int64, shape (m, 2)
-        Pairs of numbers in ``GRID``.
+        Pairs of numbers in ``GRID``, without a unit.
     wanted : int
 
     Returns

@@ -19,7 +19,10 @@ from vslam_ref.systems.visual_map.keyframe_map import Bytes
 
 
 def describe(feature_map: FeatureMap, points: IntArray) -> None:
-    """Write descriptor, normal and distance range of living points (n,) into the map, its own unit."""
+    """Write descriptor, normal and distance range of living points (n,) into the map, its own unit.
+
+    Implements :eq:`eq-point-normal`, :eq:`eq-point-range` and :eq:`eq-point-descriptor`.
+    """
     feature_map.new_references()
     seen, table = feature_map.sightings, feature_map.points
     wanted = np.zeros(len(table), np.bool_)

@@ -11,7 +11,7 @@ from vslam_ref.systems.orbslam.settings import FeatureSettings
 
 
 def describe_picture(number: int, grey: ArrayLike, settings: FeatureSettings) -> DescribedPicture:
-    """Find the features of a picture (H, W), grey levels of 8 bits."""
+    """Find the features of a picture (H, W), grey levels of 8 bits; their places are in pixels."""
     features = extract(grey, settings.orb)
     image = np.asarray(grey)
     x, y = np.rint(features.uv).astype(np.int64).T

@@ -28,7 +28,7 @@ NEARER, FARTHER = 0.8, 1.2
 """Of the range of distances: octaves are steps, and the range's ends are not sharp."""
 
 
-class Expected(NamedTuple):
+class ExpectedPoints(NamedTuple):
     """Points that a pose should show.
 
     Attributes
@@ -48,8 +48,11 @@ class Expected(NamedTuple):
     depth: Array
 
 
-def expected(feature_map: FeatureMap, points: IntArray, T_cam_world: Array) -> Expected:
-    """Points (n,) that a camera at a pose (4, 4) should see, the map's own unit."""
+def expected(feature_map: FeatureMap, points: IntArray, T_cam_world: Array) -> ExpectedPoints:
+    """Points (n,) that a camera at a pose (4, 4) should see, the map's own unit.
+
+    Implements :eq:`eq-expected-octave`.
+    """
     table = feature_map.points
     X_cam = se3.act(T_cam_world, table["X_world"][points])
     ray = table["X_world"][points] - camera_pose.centre_from_pose(T_cam_world)
@@ -63,12 +66,12 @@ def expected(feature_map: FeatureMap, points: IntArray, T_cam_world: Array) -> E
     inside = at.valid & (at.uv >= 0).all(1) & (at.uv <= (width - 1, height - 1)).all(1)
     rows, uv = rows[inside], at.uv[inside]
     level = np.rint(np.log(most[rows] / distance[rows]) / np.log(feature_map.scale)).astype(np.int64)
-    return Expected(points[rows], uv, np.clip(level, 0, feature_map.levels - 1), X_cam[rows, 2])
+    return ExpectedPoints(points[rows], uv, np.clip(level, 0, feature_map.levels - 1), X_cam[rows, 2])
 
 
 def find(
     feature_map: FeatureMap,
-    at: Expected,
+    at: ExpectedPoints,
     features: OrbFeatures,
     *,
     radius: float,
@@ -80,7 +83,7 @@ def find(
     Parameters
     ----------
     feature_map : FeatureMap
-    at : Expected
+    at : ExpectedPoints
         n points.
     features : OrbFeatures
     radius : float

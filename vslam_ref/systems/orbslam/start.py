@@ -95,7 +95,10 @@ def go_on(
 
 
 def same_turn(a: OrbFeatures, i: IntArray, b: OrbFeatures, j: IntArray) -> BoolArray:
-    """Which matches (m,) of features i and j turned as most of them did: in the three fullest of 30 bins."""
+    """Which matches of features ``i (m,)`` and ``j (m,)`` turned as most did; angles in radians.
+
+    Implements :eq:`eq-turn-histogram`: those in the three fullest of 30 bins.
+    """
     turn = np.mod(b.angle[j] - a.angle[i], 2 * np.pi)
     each = np.rint(turn / BIN).astype(np.int64) % 30
     count = np.bincount(each, minlength=30)
@@ -132,7 +135,10 @@ def too_early(matched: Matched, s: StartSettings) -> str:
 def attempt(
     camera: Camera, matched: Matched, s: StartSettings, scale: float, rng: np.random.Generator
 ) -> Attempt | str:
-    """Try to start from the first picture, the newest and one between; a sentence if that is nothing."""
+    """Try to start from the first picture, the newest and one between; a sentence if that is nothing.
+
+    The scale of the octaves has no unit.
+    """
     rows = matched.rows
     if len(rows) < max(s.least_matches, 8):
         return f"{len(rows)} features are still found: need {s.least_matches}"

@@ -42,7 +42,7 @@ class Places(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Best ``feature (m,)`` of each place, -1 without one; its ``distance (m,)``; that of the ``second``."""
+    """Best ``feature (m,)`` of each place, or -1; its ``distance (m,)`` and the ``second (m,)``, in bits."""
 
     feature: IntArray
     distance: IntArray
@@ -50,7 +50,10 @@ class Answers(NamedTuple):
 
 
 def search_windows(places: Places, features: OrbFeatures) -> Answers:
-    """Find the feature most alike in the window of each place."""
+    """Find the feature most alike in the window of each place.
+
+    Implements :eq:`eq-window-answer`, pixels of level 0.
+    """
     return Answers(
         *_search(
             places.uv,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 from vslam_ref.systems.visual_map.telling import Attempt
 
 
-class Steps(Protocol):
+class StartSteps(Protocol):
     """How a system comes from one picture to another: its own trails begin and go on with pictures."""
 
     @property
@@ -58,7 +58,7 @@ class ChosenStart:
         if not 0 <= self.first < self.last:
             raise ValueError(f"start from pictures {self.first} and {self.last}: need the first one earlier")
 
-    def take(self, steps: Steps, trails: Any, picture: Any) -> tuple[Any, ToldStart]:
+    def take(self, steps: StartSteps, trails: Any, picture: Any) -> tuple[Any, ToldStart]:
         """Take the next picture: begin trails at the first one chosen, go on to the last, and try there."""
         if self.reason or picture.number < self.first:
             return None, ToldStart()
@@ -80,7 +80,7 @@ class ChosenStart:
             return trails, self._refuse(found.reason)._replace(attempt=found)
         return trails, ToldStart(found)
 
-    def _few(self, steps: Steps, trails: Any, picture: Any) -> ToldStart:
+    def _few(self, steps: StartSteps, trails: Any, picture: Any) -> ToldStart:
         """Refuse where too few points are found."""
         found = steps.count(trails)
         if found >= steps.least:

@@ -18,7 +18,7 @@ Sees = dict[int, dict[int, int]]
 """Keyframe -> feature -> point."""
 
 
-class Corner(NamedTuple):
+class FreeCorner(NamedTuple):
     """A feature that shows no point: place u (2,) in pixels of octave 0, octave, descriptor."""
 
     u: Array
@@ -56,7 +56,7 @@ def parents_after_culling(parent: dict[int, int], sees: Sees, kf: int) -> dict[i
 
 
 def curve_distance(camera: Camera, u_a: Array, u_b: Array, T_b_a: Array) -> float:
-    """Distance in pixels of u_b (2,) from the curve of u_a (2,), to first order; T_b_a in the map's unit."""
+    """Distance in pixels of u_b (2,) from the curve of u_a (2,), to first order; T_b_a (4, 4), own unit."""
     a, b = camera.unproject(u_a).bearing, camera.unproject_with_jacobians(u_b)
     R, t = T_b_a[:3, :3], T_b_a[:3, 3]
     normal = np.cross(t, R @ a)  # of the plane through both centres and the point
@@ -64,10 +64,13 @@ def curve_distance(camera: Camera, u_a: Array, u_b: Array, T_b_a: Array) -> floa
     return float(abs(b.bearing @ normal) / np.linalg.norm(slope))  # eq-curve-distance
 
 
-def best_on_curve(camera: Camera, corner: Corner, others: list[Corner], T_b_a: Array, limit: float) -> int:
+def best_on_curve(
+    camera: Camera, corner: FreeCorner, others: list[FreeCorner], T_b_a: Array, limit: float
+) -> int:
     """Number of the corner near the curve that differs least; -1 without one.
 
-    The limit is in pixels of the octave of the other corner, the motion in the map's own unit.
+    Implements :eq:`eq-curve-distance`; the limit is in pixels of the octave of the other corner, the motion
+    T_b_a (4, 4) in the map's own unit.
     """
     near = [
         ((corner.bits ^ other.bits).bit_count(), k)
@@ -78,9 +81,9 @@ def best_on_curve(camera: Camera, corner: Corner, others: list[Corner], T_b_a: A
 
 
 def matches(
-    camera: Camera, a: list[Corner], b: list[Corner], T_b_a: Array, limit: float, bits: int
+    camera: Camera, a: list[FreeCorner], b: list[FreeCorner], T_b_a: Array, limit: float, bits: int
 ) -> list[tuple[int, int]]:
-    """Pairs that are each other's best on the curve; limits in pixels and bits, the motion in own unit."""
+    """Pairs that are each other's best on the curve; limits in pixels and bits; T_b_a (4, 4), own unit."""
     T_a_b = np.asarray(np.linalg.inv(T_b_a))
     pairs = []
     for i, corner in enumerate(a):

@@ -39,7 +39,7 @@ def cull_redundant(feature_map: FeatureMap, newest: int, s: MapperSettings) -> i
 
 
 def redundant_share(feature_map: FeatureMap, kf: int, others: int) -> float:
-    """Share of a keyframe's points that at least so many other keyframes see as well."""
+    """Share of a keyframe's points that at least so many other keyframes see as well; no unit."""
     seen, own = feature_map.sightings, feature_map.rows_in(kf)
     if len(own) == 0:
         return 1.0

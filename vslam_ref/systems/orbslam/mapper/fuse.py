@@ -17,7 +17,8 @@ def fuse_with_neighbours(
 ) -> tuple[int, int]:
     """Look for a keyframe's points in its neighbours, and for theirs in it.
 
-    Return how many sightings were added, and how many points were fused into others.
+    Implements A§3.1, the map without points that were made twice.  Return how many sightings were added,
+    and how many points were fused into others; numbers without a unit.
     """
     around = second_neighbours(feature_map, kf, s)
     seen = fused = 0
@@ -33,7 +34,7 @@ def fuse_with_neighbours(
 
 
 def second_neighbours(feature_map: FeatureMap, kf: int, s: MapperSettings) -> IntArray:
-    """Neighbours of a keyframe and some of theirs, by number."""
+    """Neighbours of a keyframe and some of theirs, by number (n,); no unit."""
     first = neighbours(feature_map, kf, s.neighbours)
     more = [neighbours(feature_map, int(other), s.second) for other in first]
     return np.setdiff1d(np.concatenate([first, *more]), kf)

@@ -89,10 +89,11 @@ def match(a: Side, b: Side, T_b_a: Array, distance: float, limit: int) -> tuple[
     R, t = se3.rotation(T_b_a), se3.translation(T_b_a)
     E = so3.hat(t) @ R
     there = _search(a.bearing @ E.T, a.descriptor, b.bearing, b.J_pixel, b.width, b.descriptor, distance)
-    back = _search(b.bearing @ E, b.descriptor, a.bearing, a.J_pixel, a.width, a.descriptor, distance)
     i = np.flatnonzero((there[0] >= 0) & (there[1] <= limit))
     j = there[0][i]
-    keep = back[0][j] == i
+    lines, asked = b.bearing[j] @ E, b.descriptor[j]
+    back = _search(lines, asked, a.bearing, a.J_pixel, a.width, a.descriptor, distance)
+    keep = back[0] == i
     return i[keep], j[keep]
 
 

@@ -56,7 +56,10 @@ class Expectation(NamedTuple):
 
 
 def expectation(camera: Camera, size: tuple[int, int], p: MapPoint, T: Array) -> Expectation | None:
-    """Where a camera at T (4, 4), own unit, should see a point; None if it should not."""
+    """Where a camera at T (4, 4), own unit, should see a point; None if it should not.
+
+    Implements :eq:`eq-expected-octave`.
+    """
     X_c = se3.act(T, p.X)
     sight = p.X - se3.inverse(T)[:3, 3]
     d = float(np.linalg.norm(sight))
@@ -76,7 +79,10 @@ def differ(a: int, b: int) -> int:
 
 
 def answer(at: Expectation, bits: int, features: list[Feature], radius: float) -> tuple[int, int] | None:
-    """Feature most alike in a window (pixels of the octave), and its distance in bits; None if unclear."""
+    """Feature most alike in a window (pixels of the octave), and its distance in bits; None if unclear.
+
+    Implements :eq:`eq-window-answer`.
+    """
     r = radius * SCALE**at.octave
     near = [
         (differ(bits, f.bits), k)

@@ -15,7 +15,7 @@ SECOND = 10
 
 
 def local_points(feature_map: FeatureMap, seen: IntArray, s: TrackerSettings) -> IntArray:
-    """Points that may be seen together with points ``seen (n,)``."""
+    """Points that may be seen together with points ``seen (n,)``; numbers without a unit."""
     if s.local_map == "whole":
         return np.flatnonzero(feature_map.alive)
     table = feature_map.sightings
@@ -27,7 +27,7 @@ def local_points(feature_map: FeatureMap, seen: IntArray, s: TrackerSettings) ->
 def local_keyframes(feature_map: FeatureMap, seen: IntArray, most: int) -> IntArray:
     """Keyframes that see some of these points (n,), and a neighbour, a child and the parent of each.
 
-    Those that see most points come first, ``most`` in all.
+    Those that see most points come first, ``most`` in all; numbers without a unit.
     """
     table = feature_map.sightings
     wanted = np.zeros(len(feature_map.points), np.bool_)

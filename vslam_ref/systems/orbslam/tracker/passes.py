@@ -15,7 +15,7 @@ from vslam_ref.systems.orbslam.projection import expected, find
 from vslam_ref.systems.orbslam.settings import FeatureSettings, TrackerSettings
 
 
-class Pass(NamedTuple):
+class FeaturePass(NamedTuple):
     """Points that were looked for in a picture, and the pose.
 
     Attributes
@@ -23,7 +23,7 @@ class Pass(NamedTuple):
     tried : ndarray of int64, shape (n,)
         Points that were expected.
     point, feature : ndarray of int64, shape (m,)
-        Points that were found, and the features that show them.
+        Points that were found, and the features that show them; numbers without a unit.
     pose : TrackedPose
         With the weights (m,).
     """
@@ -52,7 +52,7 @@ def look_for(
     radius: float,
     s: TrackerSettings,
     f: FeatureSettings,
-) -> Pass:
+) -> FeaturePass:
     """Look for points (n,) where a pose (4, 4) puts them, in pixels of their octave; improve the pose."""
     with stage("search"):
         at = expected(feature_map, points, T_guess)
@@ -69,8 +69,12 @@ def posed(
     features: OrbFeatures,
     T_guess: Array,
     s: TrackerSettings,
-) -> Pass:
-    """Pose from features (m,) that show points (m,), near a guess (4, 4), the map's own unit."""
+) -> FeaturePass:
+    """Pose from features that show points, near a guess.
+
+    ``feature (m,)`` shows ``point (m,)``; ``tried (n,)`` is only passed on.  The guess ``T_guess (4, 4)``
+    is in the map's own unit.
+    """
     with stage("pose"):
         pose = track_pose(
             feature_map.camera,
@@ -81,4 +85,4 @@ def posed(
             steps=s.steps,
             least_sigma=s.least_sigma,
         )
-    return Pass(tried, point, feature, pose)
+    return FeaturePass(tried, point, feature, pose)

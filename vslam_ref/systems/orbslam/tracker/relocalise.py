@@ -21,19 +21,21 @@ Candidates = Callable[[FeatureMap, OrbFeatures, int], IntArray]
 """From a map, the features of a picture and a number: so many keyframes that look like it, the best first."""
 
 
-class Shown(NamedTuple):
-    """Features (m,) of a picture that show points (m,)."""
+class ShownPoints(NamedTuple):
+    """Features ``feature (m,)`` of a picture that show ``point (m,)``; numbers without a unit."""
 
     feature: IntArray
     point: IntArray
 
 
-def match_keyframe(feature_map: FeatureMap, kf: int, features: OrbFeatures, f: FeatureSettings) -> Shown:
+def match_keyframe(
+    feature_map: FeatureMap, kf: int, features: OrbFeatures, f: FeatureSettings
+) -> ShownPoints:
     """Match a picture's features with those of a keyframe that show points, wherever they are."""
     rows = feature_map.rows_in(kf)
     seen = feature_map.sightings
     pairs = hamming.match(features.descriptor, seen["descriptor"][rows], ratio=RATIO, limit=f.near)
-    return Shown(pairs.first, seen["point"][rows[pairs.second]])
+    return ShownPoints(pairs.first, seen["point"][rows[pairs.second]])
 
 
 def most_matches(feature_map: FeatureMap, features: OrbFeatures, count: int) -> IntArray:
@@ -45,7 +47,7 @@ def most_matches(feature_map: FeatureMap, features: OrbFeatures, count: int) -> 
 
 
 def by_three_points(
-    feature_map: FeatureMap, shown: Shown, features: OrbFeatures, rng: np.random.Generator
+    feature_map: FeatureMap, shown: ShownPoints, features: OrbFeatures, rng: np.random.Generator
 ) -> AgreedPose | None:
     """Pose with which most matches agree, the map's own unit; None if too few do."""
     sigma = feature_map.level_sigma(features.octave[shown.feature])

@@ -23,7 +23,7 @@ from vslam_ref.support.stopwatch import stage
 from vslam_ref.systems.orbslam.feature_map import DescribedPicture, FeatureMap
 from vslam_ref.systems.orbslam.settings import Settings
 from vslam_ref.systems.orbslam.tracker.local_map import local_points
-from vslam_ref.systems.orbslam.tracker.passes import Pass, look_for, posed
+from vslam_ref.systems.orbslam.tracker.passes import FeaturePass, look_for, posed
 from vslam_ref.systems.orbslam.tracker.relocalise import (
     Candidates,
     by_three_points,
@@ -43,7 +43,7 @@ class TrackedFeatures(NamedTuple):
     T_cam_world : ndarray, shape (4, 4)
         The map's own unit.
     quality : Quality
-    found : Pass
+    found : FeaturePass
         The last pass.
     way : str
         How the pose was found: ``velocity``, ``wide``, ``reference``, ``relocalised``.
@@ -53,7 +53,7 @@ class TrackedFeatures(NamedTuple):
 
     T_cam_world: Array
     quality: Quality
-    found: Pass
+    found: FeaturePass
     way: str
     features: OrbFeatures
 
@@ -76,7 +76,7 @@ class TrackedFeatures(NamedTuple):
 
 @dataclass
 class FeatureTracker:
-    """What the tracker remembers: T_last (4, 4) and the points seen last, the map's own unit."""
+    """What the tracker remembers: ``T_last (4, 4)``, the map's own unit, and ``points (n,)`` seen last."""
 
     settings: Settings
     rng: np.random.Generator
@@ -150,7 +150,7 @@ class FeatureTracker:
         return None
 
     def _with_the_map(
-        self, feature_map: FeatureMap, features: OrbFeatures, first: Pass, way: str
+        self, feature_map: FeatureMap, features: OrbFeatures, first: FeaturePass, way: str
     ) -> TrackedFeatures:
         """Look for all points around that the first pose shows, and judge."""
         s, f = self.settings.tracker, self.settings.features
@@ -159,7 +159,7 @@ class FeatureTracker:
         found = look_for(feature_map, points, features, first.pose.T_cam_world, s.fine_radius, s, f)
         return TrackedFeatures(found.pose.T_cam_world, self._quality(found), found, way, features)
 
-    def _quality(self, found: Pass) -> Quality:
+    def _quality(self, found: FeaturePass) -> Quality:
         """Judge by how many points agree, and how well."""
         s = self.settings.tracker
         if found.inliers < s.least_inliers or found.pose.sigma > s.worst_sigma:
@@ -168,7 +168,7 @@ class FeatureTracker:
 
     def _nothing(self, features: OrbFeatures) -> TrackedFeatures:
         pose = TrackedPose(self.T_last, np.zeros(0), np.inf, np.diag(np.full(6, np.inf)), "no pose was found")
-        none = Pass(NOTHING, NOTHING, NOTHING, pose)
+        none = FeaturePass(NOTHING, NOTHING, NOTHING, pose)
         return TrackedFeatures(self.T_last, Quality.LOST, none, "none", features)
 
     # --- what is kept -------------------------------------------------------------------------
