@@ -18,7 +18,7 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench pair-table orb-precision grade clean
+.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench pair-table orb-precision vocabulary grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
@@ -34,6 +34,7 @@ help:
 	@echo "make docs        build the book into $(BUILD)/html"
 	@echo "make bench       measure this machine, beside the peers that are installed"
 	@echo "make pair-table  learn the pairs of pixels that ORB compares (make orb-precision: beside OpenCV's)"
+	@echo "make vocabulary  train the vocabulary of ORB's words that comes with the package"
 	@echo "make grade EXERCISE=16_name FILE=mine.py   grade an answer"
 	@echo "make clean       remove everything that was made"
 
@@ -91,6 +92,9 @@ bench: $(call DONE,fast) $(call DONE,test)
 
 pair-table: $(call DONE,fast)
 	$(ONE_THREAD) $(PY) -m vslam_ref.experiments.orb.learned_pairs
+
+vocabulary: $(call DONE,fast)
+	$(ONE_THREAD) $(PY) -m vslam_ref.experiments.orb.words
 
 orb-precision: $(call DONE,fast) $(call DONE,test)
 	$(ONE_THREAD) $(PY) tests/orb/precision.py

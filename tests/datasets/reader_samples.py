@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 import pose_graph_samples
 import scipy.io
+import vocabulary_samples
 from sequence_samples import CALIB, LAYOUTS, SIZE
 
 from vslam_ref.datasets.bundle_files import BundleFile
@@ -508,6 +509,10 @@ SAMPLES: dict[str, list[Sample]] = {
             lambda folder: (folder / "data.csv", folder / "sensor.yaml"),
             check=trajectory_wrong,
         )
+    ],
+    "vocabulary_files.reading:read_vocabulary": [
+        Sample({name: data}, binary=name[-1] == "z", check=vocabulary_samples.vocabulary_wrong)
+        for name, data in vocabulary_samples.FILES.items()
     ],
     "pose_graph_files.reading:read_pose_graph": [
         Sample(_one("graph.g2o", text), check=pose_graph_samples.pose_graph_wrong)

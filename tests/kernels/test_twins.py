@@ -27,7 +27,16 @@ from vslam_ref.filters.vehicle import Increment
 from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.grids.static_dynamic import Layers, Rules
 
-from . import rows_bundle, rows_features, rows_orb, rows_orbslam, rows_pose, rows_rendered, rows_visual_map
+from . import (
+    rows_bundle,
+    rows_features,
+    rows_orb,
+    rows_orbslam,
+    rows_pose,
+    rows_rendered,
+    rows_visual_map,
+    rows_vocabulary,
+)
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 
@@ -177,6 +186,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     **rows_pose.ROWS,
     **rows_rendered.ROWS,
     **rows_visual_map.ROWS,
+    **rows_vocabulary.ROWS,
 }
 
 

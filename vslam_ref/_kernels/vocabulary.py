@@ -42,7 +42,7 @@ def descend(features, nodes, first, children):
                 bits = _ones(a ^ nodes[k, 0]) + _ones(b ^ nodes[k, 1])
                 bits += _ones(c ^ nodes[k, 2]) + _ones(d ^ nodes[k, 3])
                 if bits < least:
-                    nearest, least = k, bits
+                    nearest, least = k, bits  # type: ignore[assignment]
             at = nearest
         node[f], distance[f] = at, least
     return node, distance

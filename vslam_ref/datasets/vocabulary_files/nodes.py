@@ -59,7 +59,7 @@ def header(path: Path, line: int | None, k: int, L: int, scoring: int, weighting
 
 
 @dataclass(frozen=True)
-class Listed:
+class ListedNodes:
     """Nodes in the order of a file, without the root.
 
     Parameters

@@ -1,8 +1,8 @@
 """YAML of DBoW2 and DBoW3: a header, a list of nodes, and a list that gives each word its node.
 
 The lists have ten thousands of entries of one shape, which are read entry by entry, not as YAML: so a file of
-a million words takes seconds, and nothing in it can be constructed.  DBoW3 writes the type of the descriptor's
-elements and their number before them, "0 32".
+a million words takes seconds, and nothing in it can be constructed.  DBoW3 writes the type of the
+descriptor's elements and their number before them, "0 32".
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from vslam_ref.datasets.text import FormatError, number
-from vslam_ref.datasets.vocabulary_files.nodes import Listed, VocabularyFile, header
+from vslam_ref.datasets.vocabulary_files.nodes import ListedNodes, VocabularyFile, header
 from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.features.vocabulary.tree import BYTES
 from vslam_ref.support.files import write_text as write_file
@@ -120,7 +120,7 @@ def _entries(path: Path, text: str, at: int, names: tuple[str, ...]) -> tuple[En
     return entries, lines, at
 
 
-def _listed(path: Path, entries: Entries, lines: list[int]) -> tuple[Listed, bool]:
+def _listed(path: Path, entries: Entries, lines: list[int]) -> tuple[ListedNodes, bool]:
     """Nodes of the entries, and whether their descriptors say type and length."""
     n = len(entries)
     ids, parents, weight = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n)
@@ -132,7 +132,7 @@ def _listed(path: Path, entries: Entries, lines: list[int]) -> tuple[Listed, boo
         weight[row] = number(path, line, entry["weight"], "weight")
         words = entry["descriptor"].strip('"').split()
         descriptor[row] = descriptor_bytes(path, line, words, typed)
-    return Listed(path, ids, parents, descriptor, weight, lines), typed
+    return ListedNodes(path, ids, parents, descriptor, weight, lines), typed
 
 
 def descriptor_bytes(path: Path, line: int, words: list[str], typed: bool) -> np.ndarray:
@@ -150,7 +150,7 @@ def descriptor_bytes(path: Path, line: int, words: list[str], typed: bool) -> np
         raise FormatError(path, line, f"{said}; expected {BYTES} whole numbers from 0 to 255") from None
 
 
-def _leaves(listed: Listed, words: Entries, lines: list[int]) -> np.ndarray:
+def _leaves(listed: ListedNodes, words: Entries, lines: list[int]) -> np.ndarray:
     """Row of the node of each word."""
     row_of = {int(node): row for row, node in enumerate(listed.ids)}
     rows = np.full(len(words), -1)

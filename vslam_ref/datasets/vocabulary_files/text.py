@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vslam_ref.datasets.text import FormatError, number
-from vslam_ref.datasets.vocabulary_files.nodes import Listed, VocabularyFile, header
+from vslam_ref.datasets.vocabulary_files.nodes import ListedNodes, VocabularyFile, header
 from vslam_ref.datasets.vocabulary_files.storage import TYPED, _whole, descriptor_bytes
 from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.features.vocabulary.tree import BYTES
@@ -42,7 +42,7 @@ def parse_text(path: Path, text: str) -> VocabularyFile:
     return listed.tree(leaves, k, L, "dbow3" if typed else "text")
 
 
-def _listed(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[Listed, np.ndarray, bool]:
+def _listed(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[ListedNodes, np.ndarray, bool]:
     """Nodes of the lines, which of them are words, and whether descriptors say type and length."""
     n = len(rows)
     parents, weight, leaf = np.zeros(n, np.int64), np.zeros(n), np.zeros(n, np.bool_)
@@ -61,7 +61,7 @@ def _listed(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[Listed, np.n
         descriptor[row] = descriptor_bytes(path, line, words[2:-1], typed)
         weight[row] = number(path, line, words[-1], "weight")
     lines = [line for line, _ in rows]
-    listed = Listed(path, np.arange(1, n + 1), parents, descriptor, weight, lines)
+    listed = ListedNodes(path, np.arange(1, n + 1), parents, descriptor, weight, lines)
     return listed, np.flatnonzero(leaf), typed
 
 

@@ -11,13 +11,13 @@ module         holds
 ``book``       one level trained, one descent, one bag, one score in plain loops
 =============  ==================================================================================
 
-A descriptor is 32 bytes, 256 bits, and the distance of two is the number of bits that differ.  The definitions
-are those of DBoW2, so that its vocabularies give the same words, weights and scores here; where two children
-are equally near, the first one wins.  A picture without a word scores 0 with every picture.
+A descriptor is 32 bytes, 256 bits, and the distance of two is the number of bits that differ.  The
+definitions are those of DBoW2, so that its vocabularies give the same words, weights and scores here; where
+two children are equally near, the first one wins.  A picture without a word scores 0 with every picture.
 """
 
 from vslam_ref.features.vocabulary.bags import Bag, bag, score
-from vslam_ref.features.vocabulary.database import Database, Found, best
+from vslam_ref.features.vocabulary.database import Database, QueryResult, best
 from vslam_ref.features.vocabulary.matching import Matched, Matching, match, turned_alike
 from vslam_ref.features.vocabulary.training import inverse_document_frequency, train
 from vslam_ref.features.vocabulary.tree import (
@@ -33,7 +33,7 @@ __all__ = [
     "Bag",
     "Database",
     "Descended",
-    "Found",
+    "QueryResult",
     "Matched",
     "Matching",
     "Vocabulary",

@@ -10,7 +10,7 @@ from vslam_ref.arrays import Array, BoolArray, IntArray
 from vslam_ref.features.vocabulary.bags import Bag
 
 
-class Found(NamedTuple):
+class QueryResult(NamedTuple):
     """Answer of a query.
 
     Attributes
@@ -42,7 +42,7 @@ class Database:
     >>> index.add(Bag(np.array([0, 4]), np.array([0.25, 0.75]))), index.add(Bag(np.array([1]), np.ones(1)))
     (0, 1)
     >>> index.query(Bag(np.array([4]), np.ones(1)))
-    Found(entry=array([0]), score=array([0.75]), common=array([1]))
+    QueryResult(entry=array([0]), score=array([0.75]), common=array([1]))
     """
 
     def __init__(self, words: int) -> None:
@@ -88,7 +88,7 @@ class Database:
             raise ValueError(f"entry {entry} of {len(self._bags)}: not there, or removed")
         return bag
 
-    def query(self, bag: Bag, allowed: BoolArray | None = None) -> Found:
+    def query(self, bag: Bag, allowed: BoolArray | None = None) -> QueryResult:
         """Pictures that share words with a picture, by their numbers.
 
         Parameters
@@ -99,7 +99,7 @@ class Database:
 
         Returns
         -------
-        Found
+        QueryResult
 
         Raises
         ------
@@ -116,14 +116,15 @@ class Database:
             common[at] += 1
         keep = common > 0 if allowed is None else (common > 0) & allowed
         entry = np.flatnonzero(keep)
-        return Found(entry, total[entry], common[entry])
+        return QueryResult(entry, total[entry], common[entry])
 
 
-def best(found: Found, most: int) -> Found:
+def best(found: QueryResult, most: int) -> QueryResult:
     """The best ``most`` pictures of an answer, by score; of equal ones the first.
 
-    >>> best(Found(np.array([3, 5, 8]), np.array([0.1, 0.3, 0.2]), np.array([1, 4, 2])), 2).entry.tolist()
+    >>> found = QueryResult(np.array([3, 5, 8]), np.array([0.1, 0.3, 0.2]), np.array([1, 4, 2]))
+    >>> best(found, 2).entry.tolist()
     [5, 8]
     """
     order = np.argsort(-found.score, kind="stable")[:most]
-    return Found(*(field[order] for field in found))
+    return QueryResult(found.entry[order], found.score[order], found.common[order])

@@ -3,8 +3,8 @@
 A vocabulary parts descriptors coarsely on its first levels: features of one point are mostly under one node.
 So only they are compared, and the work falls with the number of nodes.  At level 0 all are under the root.
 
-A picture that is turned turns the directions of all its features alike: pairs whose directions differ otherwise
-than most are wrong.
+A picture that is turned turns the directions of all its features alike: pairs whose directions differ
+otherwise than most are wrong.
 """
 
 from __future__ import annotations

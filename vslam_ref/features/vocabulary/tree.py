@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features.hamming import bit_count
+from vslam_ref.features.hamming import words as hamming_words
 
 Bytes = NDArray[np.uint8]
 Lanes = NDArray[np.uint64]
 BYTES = 32
 """Of a descriptor."""
-ONES = np.array([bin(k).count("1") for k in range(256)], np.uint8)
-"""How many bits of a byte are 1."""
 AT_ONCE = 2048
 """Features that descend together: their children's bits take some ten megabytes."""
 
@@ -185,7 +185,7 @@ class Descended(NamedTuple):
     Attributes
     ----------
     node : ndarray of int, shape (N,)
-        The leaf of each feature.
+        The leaf of each feature; no unit.
     distance : ndarray of int, shape (N,)
         Bits in which it differs from that leaf.
     """
@@ -204,7 +204,7 @@ def lanes(descriptor: Bytes) -> Lanes:
     """
     if descriptor.ndim != 2 or descriptor.shape[1] != BYTES or descriptor.dtype != np.uint8:
         raise ValueError(f"descriptor {descriptor.dtype} {descriptor.shape}: need bytes (N, {BYTES})")
-    return np.ascontiguousarray(descriptor).view(np.uint64)
+    return hamming_words(descriptor)
 
 
 def descend(vocabulary: Vocabulary, descriptor: Bytes) -> Descended:
@@ -246,7 +246,7 @@ def _descend(features: Lanes, nodes: Lanes, first: IntArray, children: IntArray)
             there = place < children[node[rows], None]
             below = np.where(there, first[node[rows], None] + place, 0)
             differing = features[rows, None] ^ nodes[below]
-            bits = ONES[differing.view(np.uint8)].sum(-1, dtype=np.int64)
+            bits = bit_count(differing).sum(-1, dtype=np.int64)
             nearest = np.argmin(np.where(there, bits, 8 * BYTES + 1), axis=1)
             node[rows] = first[node[rows]] + nearest
             distance[rows] = bits[np.arange(len(rows)), nearest]
@@ -254,12 +254,12 @@ def _descend(features: Lanes, nodes: Lanes, first: IntArray, children: IntArray)
 
 
 def words(vocabulary: Vocabulary, descriptor: Bytes) -> IntArray:
-    """Word (N,) of each descriptor (N, 32)."""
+    """Word (N,) of each descriptor (N, 32); no unit."""
     return vocabulary.word[descend(vocabulary, descriptor).node]
 
 
 def nodes_at_level(vocabulary: Vocabulary, node: IntArray, level: int) -> IntArray:
-    """Direct index: the ancestor (N,) of each node (N,) on a level, or the node where it stands higher.
+    """Direct index: the ancestor (N,) of each node (N,) on a level, itself if higher; no unit.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """A building that makes place recognition err: one door everywhere, few posters hung again and again.
 
-The corridors are those of ``building``, but each of its four sides has an order of its own.  What differs from
-place to place is this order, the flecks of plaster, floor and ceiling, and posters that are nowhere else; what
-is the same is every door, the joints of floor and ceiling, and every poster that is hung twice.  The walk goes
-round twice, on the second round beside the first one.
+The corridors are those of ``building``, but each of its four sides has an order of its own.  What differs
+from place to place is this order, the flecks of plaster, floor and ceiling, and posters that are nowhere
+else; what is the same is every door, the joints of floor and ceiling, and every poster that is hung twice.
+The walk goes round twice, on the second round beside the first one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vslam_ref.worlds.rendered.desk import Builder
 from vslam_ref.worlds.rendered.quads import joined, quad
 from vslam_ref.worlds.rendered.record import EXACT, Effects, RenderedScene
 from vslam_ref.worlds.rendered.scenes import pinhole
-from vslam_ref.worlds.rendered.textures import pack
+from vslam_ref.worlds.rendered.textures import Bytes, pack
 
 Rng = np.random.Generator
 LAP = 4 * (building.SIDE - 2 * building.RADIUS + building.RADIUS * np.pi / 2) / building.SPEED
@@ -35,14 +35,17 @@ class Repeats(NamedTuple):
     ----------
     doors : float
         Share of the things on the walls that are the one door.
+    numbered : bool
+        Whether each door has a sign of its own; else all have one.
     again : float
         Share of the posters that hang in several places.
     posters : int
         How many different ones these are.
     """
 
-    doors: float = 0.4
-    again: float = 0.2
+    doors: float = 0.5
+    numbered: bool = True
+    again: float = 0.1
     posters: int = 6
 
 
@@ -92,7 +95,9 @@ def lookalikes(
     path = motion.held(building.path(way), sway)
     times = 2 * LAP * np.arange(pictures) / pictures
     lens = pinhole("building", size)
-    return RenderedScene("lookalikes", joined(b.parts), pack(b.images), lens, size, path, times, effects, seed)
+    return RenderedScene(
+        "lookalikes", joined(b.parts), pack(b.images), lens, size, path, times, effects, seed
+    )
 
 
 class _Stock(NamedTuple):
@@ -135,22 +140,37 @@ def _wall(b: Builder, start: Array, length: float, inwards: float, stock: _Stock
         low, (image, wide, tall) = _thing(b, stock, repeats)
         if x + wide > length - 0.1:
             break
-        b.parts.append(quad(foot + before + x * right + [0, 0, low + tall], wide * right, [0, 0, -tall], image))
+        b.parts.append(
+            quad(foot + before + x * right + [0, 0, low + tall], wide * right, [0, 0, -tall], image)
+        )
         x += wide + float(b.rng.uniform(0.3, 1.2))
 
 
 def _thing(b: Builder, stock: _Stock, repeats: Repeats) -> tuple[float, tuple[int, float, float]]:
     """What hangs next, and how high, metres."""
     if b.rng.random() < repeats.doors:
-        return 0.0, (stock.door, *DOOR)
+        if not repeats.numbered:
+            return 0.0, (stock.door, *DOOR)
+        b.images.append(numbered(b.images[stock.door], b.rng))
+        return 0.0, (len(b.images) - 1, *DOOR)
     low = float(b.rng.uniform(1.0, 1.35))
     if b.rng.random() < repeats.again:
         return low, stock.posters[int(b.rng.integers(len(stock.posters)))]
     return low, _poster(b)
 
 
+def numbered(door: Bytes, rng: Rng) -> Bytes:
+    """The same door (H, W) with another sign, where ``painting.door`` has it; grey values, no unit."""
+    height, width = door.shape
+    rows, columns = slice(height // 5, height // 5 + height // 12), slice(int(0.3 * width), int(0.7 * width))
+    other = painting.door(rng, door.shape)
+    made = door.copy()
+    made[rows, columns] = other[rows, columns]
+    return made
+
+
 def overlap(scene: RenderedScene, grid: tuple[int, int] = (8, 6)) -> Array:
-    """Share (K, K) of what picture k shows that picture j shows, too, from points of a grid (W, H); a ratio."""
+    """Share (K, K) of a grid (W, H) of points of picture k that picture j shows, too; a ratio."""
     u, v = ((np.arange(n) + 0.5) / n * size - 0.5 for n, size in zip(grid, scene.size, strict=True))
     uv = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
     X = np.concatenate([scene.surface(k, uv) for k in range(len(scene))])

@@ -1,8 +1,8 @@
 r"""Seven pairs of pixels: the fundamental matrices that fit them, one or three.
 
 Seven rows of the epipolar constraint leave a line of matrices, :math:`F = \lambda A + (1 - \lambda) B`, and
-:math:`\det F = 0` is a cubic in :math:`\lambda`.  No camera is needed, and one pair less than for eight points
-means fewer samples until one is clean.
+:math:`\det F = 0` is a cubic in :math:`\lambda`.  No camera is needed, and one pair less than for eight
+points means fewer samples until one is clean.
 """
 
 from __future__ import annotations
@@ -52,10 +52,8 @@ def seven_point_fundamentals(uv_a: ArrayLike, uv_b: ArrayLike) -> SevenPointMatr
     ValueError
         If shapes are others, or a number is not finite.
 
-    Notes
-    -----
-    Where the pairs lie on a plane, the seven rows leave more than a line of matrices, and the answer is some of
-    those that fit.
+    Notes ----- Where the pairs lie on a plane, the seven rows leave more than a line of matrices, and the
+    answer is some of those that fit.
 
     Examples
     --------
