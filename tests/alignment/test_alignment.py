@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from vslam_ref.geometry.alignment import Alignment, align
+from vslam_ref.geometry.alignment import Alignment, align, align_triples
 
 EPS = float(np.finfo(float).eps)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -245,3 +245,34 @@ def test_a_transposed_rotation_would_be_noticed() -> None:
     wrong = Alignment(1.0, found.R_target_source.T, found.t_target_source, 0.0, "", True)
     assert np.abs(found.act(x) - x @ R.T).max() < 1e-13
     assert np.abs(wrong.act(x) - x @ R.T).max() > 0.1
+
+
+def test_triangles_at_once_are_triangles_one_by_one() -> None:
+    """Noisy triangles: nothing fits exactly, so only the smallest cost is the answer of both."""
+    rng = np.random.default_rng(11)
+    x = rng.normal(size=(4, 5, 3, 3)) + 3
+    y = 2.5 * x @ random_rotation(rng, 3).T + 0.3 * rng.normal(size=x.shape) - 7
+    found = align_triples(x, y)
+    assert found.valid.all()
+    for k in np.ndindex(4, 5):
+        one = align(x[k], y[k], with_scale=True)
+        S = found.S_target_source[k]
+        # the same decomposition, of triangles whose sides differ by less than a hundred
+        np.testing.assert_allclose(S[:3, :3], one.scale * one.R_target_source, rtol=0, atol=1e4 * EPS)
+        np.testing.assert_allclose(S[:3, 3], one.t_target_source, rtol=0, atol=1e5 * EPS)
+        assert np.linalg.det(S[:3, :3]) > 0
+        np.testing.assert_array_equal(S[3], [0, 0, 0, 1])
+
+
+def test_triangles_that_determine_nothing_are_named() -> None:
+    rng = np.random.default_rng(12)
+    good, line, place = rng.normal(size=(3, 3)), LINE[:3], np.full((3, 3), 1e6 + 1 / 3)
+    nan = np.where(np.eye(3) > 0, np.nan, good)
+    hair = LINE[[0, 3, 7]] + 1e-3 * np.array([[0, 0, 0], [1.0, 0, 0], [0, 0, 0]])
+    source = np.array([good, line, good, place, good, nan, hair])
+    target = np.array([good, good, line, good, place, good, hair])
+    found = align_triples(source, target)
+    assert found.reason.tolist() == ["", "one line", "one line", "one place", "one place", "not finite", ""]
+    np.testing.assert_array_equal(found.S_target_source[1:6], np.broadcast_to(np.eye(4), (5, 4, 4)))
+    with pytest.raises(ValueError, match="need the same shape"):
+        align_triples(source, target[:3])

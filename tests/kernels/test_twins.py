@@ -31,13 +31,13 @@ from . import (
     rows_bundle,
     rows_features,
     rows_orb,
+    rows_orbslam,
     rows_pose,
     rows_posegraph,
     rows_rendered,
     rows_visual_map,
     rows_vocabulary,
 )
-from . import rows_bundle, rows_features, rows_orb, rows_orbslam, rows_pose, rows_rendered, rows_visual_map
 
 pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
 

@@ -28,16 +28,21 @@ image; among the rotations the least is lost by turning the sign where the singu
 exactly when this sum is positive.  It vanishes for points on one line (in space: a turn about the line
 changes no distance), for points at one place, and for a mirror image that is as thick in one direction as
 in another.
+
+**Three points** are the fewest that fix a similarity of space.  A triangle is flat, so the smallest singular
+value is 0, and no mirror image can be told from the triangle itself: only one place and one line are left to
+fear.  :func:`align_triples` does many triangles at once, for samples.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, BoolArray, as_array
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -148,6 +153,80 @@ def align(
     left = scale * p @ R.T - q
     rmse = float(np.sqrt(w @ np.sum(left**2, axis=1)))
     return Alignment(scale, R, t, rmse, _reason(D, S, moves_x, moves_y), scale_known)
+
+
+class Triples(NamedTuple):
+    """Similarities of many triangles.
+
+    Attributes
+    ----------
+    S_target_source : ndarray, shape (..., 4, 4)
+        The identity where the triangle determines none; translations in the unit of the target.
+    reason : ndarray of str, shape (...)
+        Empty, or what is wrong with the triangle.
+    """
+
+    S_target_source: Array
+    reason: NDArray[np.str_]
+
+    @property
+    def valid(self) -> BoolArray:
+        """Whether each triangle determines a similarity, (...)."""
+        found: BoolArray = self.reason == ""
+        return found
+
+
+def align_triples(source: ArrayLike, target: ArrayLike) -> Triples:
+    """Similarities of many pairs of triangles, as :func:`align` finds that of one.
+
+    Implements :eq:`eq-umeyama` with three points of space.
+
+    Parameters
+    ----------
+    source, target : array_like, shape (..., 3, 3)
+        Three points, one a row, of each triangle; each set in a unit of its own.
+
+    Returns
+    -------
+    Triples
+        A triangle whose corners lie on one line, or at one place, is named; so is one with a number that is
+        not finite.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+
+    Examples
+    --------
+    >>> triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> found = align_triples([triangle, triangle * [1, 0, 0]], [2 * triangle + 1, triangle])
+    >>> found.S_target_source[0].round(12).tolist()
+    [[2.0, 0.0, 0.0, 1.0], [0.0, 2.0, 0.0, 1.0], [0.0, 0.0, 2.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
+    >>> found.reason.tolist()
+    ['', 'one line']
+    """
+    x, y = as_array("source", source, 3, 3), as_array("target", target, 3, 3)
+    if x.shape != y.shape:
+        raise ValueError(f"source {x.shape} and target {y.shape}: need the same shape (..., 3, 3)")
+    finite = np.asarray((np.maximum(np.abs(x), np.abs(y)) < LARGEST).all((-2, -1)))
+    x, y = (np.where(finite[..., None, None], points, 0.0) for points in (x, y))
+    mean_x, mean_y = x.mean(-2), y.mean(-2)
+    p, q = x - mean_x[..., None, :], y - mean_y[..., None, :]
+    U, D, Vt = np.linalg.svd(np.swapaxes(q, -1, -2) @ p)
+    U[..., :, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[..., None]
+    moves_x, moves_y = np.sum(p * p, (-2, -1)), np.sum(q * q, (-2, -1))
+    rounding = [(8 * EPS * np.abs(points).max((-2, -1))) ** 2 for points in (x, y)]
+    still = (moves_x <= rounding[0]) | (moves_y <= rounding[1])
+    cases = [~finite, still, D[..., 1] <= FLAT * np.sqrt(moves_x * moves_y)]
+    reason = np.select(cases, ["not finite", "one place", "one line"], "")
+    good = reason == ""
+    s = np.where(good, (D[..., 0] + D[..., 1]) / np.where(good, moves_x, 1.0), 1.0)
+    S = np.zeros((*x.shape[:-2], 4, 4))
+    S[..., :3, :3] = np.where(good[..., None, None], s[..., None, None] * (U @ Vt), np.eye(3))
+    turned = np.einsum("...ij,...j->...i", S[..., :3, :3], mean_x)
+    S[..., :3, 3], S[..., 3, 3] = np.where(good[..., None], mean_y - turned, 0.0), 1.0
+    return Triples(S, reason)
 
 
 def _points(source: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:

@@ -15,6 +15,9 @@ module              holds
 ``tracker``         the pose of every picture
 ``policy``          which pictures become keyframes
 ``mapper``          what happens to these
+``recognition``     places that were seen before, in pictures alone
+``essential_graph`` the pairs along which the error of a loop is spread
+``loops``           loop closing
 ==================  ==============================================================================
 
 A system takes pictures; it opens no files and draws nothing.

@@ -10,7 +10,6 @@ In this order, one after the other, on one thread: the same pictures and seed gi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +22,8 @@ from vslam_ref.support.stopwatch import Stopwatch, stage
 from vslam_ref.systems.orbslam import start as start_steps
 from vslam_ref.systems.orbslam.feature_map import DescribedPicture, FeatureMap
 from vslam_ref.systems.orbslam.look import describe_picture
+from vslam_ref.systems.orbslam.loops.closer import LoopCloser
+from vslam_ref.systems.orbslam.loops.join import rescaled
 from vslam_ref.systems.orbslam.mapper.adjusting import adjust_all, robust
 from vslam_ref.systems.orbslam.mapper.mapper import LocalMapping, map_keyframe
 from vslam_ref.systems.orbslam.policy import CovisibilityPolicy
@@ -34,14 +35,12 @@ from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 from vslam_ref.systems.visual_map.refine_camera import RefinedCamera, refine_camera
 from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, Pose, Quality, Trail, path_of
 
+NO_LOOPS = {"loops": 0, "loops_rejected": 0, "essential_edges": 0}
 STAGES = (
     "features", "start", "search", "pose", "local map", "recover",
     "keyframe in", "new points", "fuse", "local", "cull", "loops", "rest",
 )  # fmt: skip
 """Of a step, in their order: before there is a map; the tracker's; the mapper's; and what is left."""
-
-CloseLoops = Callable[[FeatureMap, int], bool]
-"""Called with the map and its newest keyframe; true if it has moved the map."""
 
 
 @dataclass
@@ -54,14 +53,14 @@ class OrbSlam:
     settings : Settings, optional
     chosen : ChosenStart, optional
         Two pictures to start from; by default the system finds them.
-    close_loops : callable, optional
+    close_loops : LoopCloser, optional
         What looks for loops after each keyframe; none by default.
     """
 
     camera: Camera
     settings: Settings = field(default_factory=Settings)
     chosen: ChosenStart | None = None
-    close_loops: CloseLoops | None = None
+    close_loops: LoopCloser | None = None
 
     def __post_init__(self) -> None:
         s = self.settings
@@ -74,7 +73,6 @@ class OrbSlam:
         self.started_at: tuple[int, int] | None = None
         self.shape: tuple[int, int] | None = None
         self.refined: RefinedCamera | None = None
-        self.loops = 0
 
     def step(self, number: int, grey: ArrayLike) -> PictureOutcome:
         """Take the next picture.
@@ -198,7 +196,10 @@ class OrbSlam:
         )
         if self.close_loops is not None:
             with stage("loops"):
-                self.loops += self.close_loops(feature_map, mapped.kf)
+                scale = self.close_loops(feature_map, mapped.kf)
+            if scale is not None:
+                self.poses = rescaled(self.poses, scale)
+                tracker.motion.velocity[:3] *= scale[mapped.kf]
         live = self.poses[picture.number].live
         self.poses[picture.number] = Pose(picture.number, mapped.kf, np.eye(4), live)
         tracker.T_last = feature_map.T_kf_world[mapped.kf].copy()
@@ -232,7 +233,8 @@ class OrbSlam:
     def counts(self) -> dict[str, int]:
         """What this system counts beside what all do."""
         culled = 0 if self.map is None else self.map.culled
-        return {"loops": self.loops, "loops_rejected": 0, "essential_edges": 0, "culled_keyframes": culled}
+        loops = self.close_loops.counts() if self.close_loops else NO_LOOPS
+        return {**loops, "culled_keyframes": culled}
 
     def trail(self) -> Trail | None:
         """Features that are followed before there is a map; None without any."""

@@ -1,0 +1,45 @@
+"""Numbers of loop closing, and why each has its value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vslam_ref.support.config import assume, settings
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """When a loop is believed, and how it is closed; every field has its own unit, beside it."""
+
+    consistent: int = assume(3, "keyframes", "in a row that propose one place; ORB-SLAM's")
+    apart: int = assume(10, "keyframes", "after a loop before the next one; ORB-SLAM's")
+    ratio: float = assume(0.75, "", "of the best to the second distance; ORB-SLAM's")
+    bits: int = assume(50, "bits", "largest Hamming distance where the place is not known; ORB-SLAM's")
+    guided_bits: int = assume(100, "bits", "largest where it is; ORB-SLAM's")
+    least_matches: int = assume(
+        20, "points", "of both keyframes before a similarity is looked for; ORB-SLAM's"
+    )
+    draws: int = assume(300, "samples", "of three points; ORB-SLAM's")
+    guided_radius: float = assume(7.5, "px of the octave", "around the place of a point; ORB-SLAM's")
+    least_inliers: int = assume(20, "points", "that agree on the similarity; ORB-SLAM's")
+    wide_radius: float = assume(10.0, "px of the octave", "around the points of the whole place; ORB-SLAM's")
+    least_points: int = assume(40, "points", "of the whole place found again; ORB-SLAM's")
+    group: int = assume(
+        15, "points", "shared by neighbours, which are no candidates, and move as one; ORB-SLAM's"
+    )
+    fuse_radius: float = assume(4.0, "px of the octave", "where points of both visits become one; ORB-SLAM's")
+    theta_min: int = assume(100, "points", "shared by the pairs of the essential graph; ORB-SLAM's")
+    steps: int = assume(20, "", "of the pose graph; ORB-SLAM's")
+    last_steps: int = assume(20, "", "of the adjustment of everything afterwards; 0 leaves it out")
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that mean nothing."""
+        for key, _, value, _, _ in settings(self):
+            least = 0 if key in ("apart", "last_steps", "fuse_radius") else 1e-9
+            if not (math.isfinite(value) and value >= least):
+                raise ValueError(
+                    f"{key}={value:g}: need a number of {'0 or more' if least == 0 else 'above 0'}"
+                )
+        if self.ratio > 1:
+            raise ValueError(f"ratio={self.ratio:g}: need a share up to 1")
