@@ -65,7 +65,7 @@ CHAPTERS = (
     Chapter(11, "Mapping", "From images to a map", "systems/ptam/mapper", "11_mapping"),
     Chapter(12, "PTAM", "From images to a map", "systems/ptam", "12_ptam"),
     Chapter(13, "Pose graphs", "Closing loops", "estimation/posegraph", "13_pose_graphs"),
-    Chapter(14, "ORB-SLAM", "Closing loops", "systems/orbslam"),
+    Chapter(14, "ORB-SLAM", "Closing loops", "systems/orbslam", "14_orb_slam"),
     Chapter(15, "Ackermann EKF-SLAM", "Filters", "filters/ekf_slam", "15_ekf_slam"),
     Chapter(16, "IEKF-SLAM", "Filters", "filters/carleman_ekf", "16_carleman_ekf"),
     Chapter(17, "Consistency", "Filters", "metrics/consistency", "17_consistency"),

@@ -12,9 +12,9 @@ loops, loops_rejected, essential_edges, culled_keyframes: loops that were closed
 of the graph that closing moves, keyframes that added nothing to others.
 
 --start I,J: the features of picture I are matched with those of J, and one start is tried there: it holds, or
-the run ends without a map and says why. Pictures between both are tracked afterwards; those before I are not. Choose two
-that show the same things, with the camera moved sideways between them by a tenth of their distance or so: if
-it only turned, or hardly moved, many motions explain the pictures.
+the run ends without a map and says why. Pictures between both are tracked afterwards; those before I are not.
+Choose two that show the same things, with the camera moved sideways between them by a tenth of their distance
+or so: if it only turned, or hardly moved, many motions explain the pictures.
 
 '--set features.features=2000' changes a setting. Parts are left out so: features.spread=false (features
 where corners are strongest), mapper.fuse=false (points made twice stay two), mapper.local_steps=0 (no

@@ -39,6 +39,16 @@ def levels_figure(levels: Sequence[Bytes], corners: Sequence[ArrayLike]) -> Figu
     return figure
 
 
+def places_figure(image: Bytes, places: Mapping[str, ArrayLike]) -> Figure:
+    """One picture several times, each with its places (n, 2), pixels."""
+    with style.house_style():
+        figure, panels = style.new_figure(2.6, len(places))
+        for axes, (name, uv) in zip(panels, places.items(), strict=True):
+            show(axes, image, name)
+            axes.plot(*np.asarray(uv).T, ".", color=style.ORANGE, ms=4)
+    return figure
+
+
 def circle_figure(image: Bytes, places: Mapping[str, tuple[int, int]], threshold: int) -> Figure:
     """Surroundings of some pixels with the circle of 16: brighter, darker, or alike."""
     with style.house_style():

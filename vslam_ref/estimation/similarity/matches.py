@@ -172,7 +172,7 @@ def distance_ratio(S_b_a: Array, X_a: Array, X_b: Array) -> Array:
     Similarity ``S_b_a (..., 4, 4)``, points ``X_a (..., 3)``, ``X_b (..., 3)`` in the keyframes' own units.
     """
     there = np.linalg.norm(sim3.act(S_b_a, X_a), axis=-1, keepdims=True)
-    return np.asarray(np.log(there / np.linalg.norm(X_b, axis=-1, keepdims=True)))
+    return np.asarray(np.log(there / np.linalg.norm(X_b, axis=-1, keepdims=True)))  # eq-distance-ratio
 
 
 def distance_ratio_with_jacobians(S_b_a: Array, X_a: Array, X_b: Array) -> DistanceRatio:
@@ -190,7 +190,7 @@ def distance_ratio_with_jacobians(S_b_a: Array, X_a: Array, X_b: Array) -> Dista
 def whitened(images: Array, matches: PointMatches) -> Array:
     """Errors (..., N, 4) of images (..., N, 4) in sigmas: in b first, then in a."""
     uv = np.concatenate([matches.uv_b, matches.uv_a], -1)
-    return np.asarray((images - uv) / matches.sigma)
+    return np.asarray((images - uv) / matches.sigma)  # eq-both-images
 
 
 def squared(S_b_a: Array, matches: PointMatches) -> Array:

@@ -69,7 +69,7 @@ def bag(vocabulary: Vocabulary, word: ArrayLike) -> Bag:
     found, count = np.unique(given, return_counts=True)
     value = count * vocabulary.weight[found]
     found, value = found[value > 0], value[value > 0]
-    return Bag(found, value / value.sum() if len(value) else value)
+    return Bag(found, value / value.sum() if len(value) else value)  # eq-bag
 
 
 def score(a: Bag, b: Bag) -> float:
@@ -82,4 +82,4 @@ def score(a: Bag, b: Bag) -> float:
     (0.75, 1.0, 0.0)
     """
     _, at_a, at_b = np.intersect1d(a.word, b.word, assume_unique=True, return_indices=True)
-    return float(np.minimum(a.value[at_a], b.value[at_b]).sum())
+    return float(np.minimum(a.value[at_a], b.value[at_b]).sum())  # eq-bag-score

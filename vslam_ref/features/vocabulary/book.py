@@ -22,7 +22,7 @@ def hamming(a: Bits, b: Bits) -> int:
 
 def median(members: list[Bits]) -> Bits:
     """Bit by bit what most members have; a draw becomes 1."""
-    return tuple(int(2 * sum(bits) >= len(members)) for bits in zip(*members, strict=True))
+    return tuple(int(2 * sum(bits) >= len(members)) for bits in zip(*members, strict=True))  # eq-word-median
 
 
 def nearest(descriptor: Bits, centres: list[Bits]) -> int:
@@ -82,7 +82,7 @@ def descend(root: TreeNode, descriptor: Bits) -> int:
 def idf(pictures: list[list[int]], word: int) -> float:
     """How much a word says, no unit: log of all pictures over those that have it, 0 if none has."""
     having = sum(word in words for words in pictures)
-    return math.log(len(pictures) / having) if having else 0.0
+    return math.log(len(pictures) / having) if having else 0.0  # eq-idf
 
 
 def weigh(words: list[int], weight: list[float]) -> Words:
@@ -92,12 +92,12 @@ def weigh(words: list[int], weight: list[float]) -> Words:
         if weight[word] > 0:
             value[word] += weight[word]
     total = sum(value.values())
-    return {word: one / total for word, one in value.items()}
+    return {word: one / total for word, one in value.items()}  # eq-bag
 
 
 def score(a: Words, b: Words) -> float:
     """How alike two pictures are, a ratio; without a common word 0, not one half."""
-    return sum(min(a[word], b[word]) for word in a if word in b)
+    return sum(min(a[word], b[word]) for word in a if word in b)  # eq-bag-score
 
 
 def ask(index: dict[int, list[tuple[int, float]]], query: Words) -> dict[int, float]:

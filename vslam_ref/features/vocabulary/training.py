@@ -82,7 +82,7 @@ def inverse_document_frequency(pictures: Sequence[ArrayLike], count: int) -> Arr
     seen = np.zeros(count, np.int64)
     for one in pictures:
         seen[np.unique(np.asarray(one, np.int64))] += 1
-    return np.asarray(np.where(seen > 0, np.log(len(pictures) / np.maximum(seen, 1)), 0.0))
+    return np.asarray(np.where(seen > 0, np.log(len(pictures) / np.maximum(seen, 1)), 0.0))  # eq-idf
 
 
 class Parted(NamedTuple):
@@ -141,7 +141,8 @@ def _first_centres(signs: Signs, rng: np.random.Generator, clusters: int) -> Sig
 def _medians(signs: Signs, label: IntArray) -> Signs:
     """Bit by bit what most members of each cluster have, (k, 256); a draw becomes 1."""
     member = (label == np.arange(label.max() + 1)[:, None]).astype(np.float32)
-    return np.where(member @ signs >= 0, 1.0, -1.0).astype(np.float32)  # sums of whole numbers: exact
+    total = member @ signs  # sums of whole numbers: exact
+    return np.where(total >= 0, 1.0, -1.0).astype(np.float32)  # eq-word-median
 
 
 class _Growing(NamedTuple):

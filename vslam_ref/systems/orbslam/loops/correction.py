@@ -110,7 +110,7 @@ def close_loop(
         S_l_c = se3.from_rt(sim3.rotation(S_l_c), sim3.translation(S_l_c))
     start = X.copy()
     members = np.union1d(loop.group, [loop.current]).astype(np.int64)
-    start[members] = X[loop.loop] @ S_l_c @ T[loop.current] @ X[members]
+    start[members] = X[loop.loop] @ S_l_c @ T[loop.current] @ X[members]  # eq-loop-start
     pairs = np.concatenate([[[loop.current, loop.loop]], loop.pairs]).astype(np.int64)
     old = group.between(X[edges.tail], X[edges.head])
     new = group.between(start[pairs[:, 0]], X[pairs[:, 1]])
@@ -161,4 +161,4 @@ def move_points(
     """
     X, r = np.asarray(X_world, dtype=np.float64), np.asarray(reference, dtype=np.int64)
     move = sim3.compose(S_world_kf, T_kf_world)
-    return np.asarray(sim3.act(move[r], X))
+    return np.asarray(sim3.act(move[r], X))  # eq-loop-points
