@@ -387,6 +387,28 @@ class _Log(NamedTuple):
 _MRCLAM_LOG = _Log(100.0, np.array([0.0, 1.5]), np.zeros((2, 2)))
 _PARK_LOG = _Log(0.0, _TIME / 1e3, np.stack([np.ones(len(_TIME)), np.zeros(len(_TIME))], -1))
 
+RAW = """calib_time: 09-Jan-2012 13:57:47
+S_00: 1392 512
+K_00: 984.25 0 690 0 980.75 233.25 0 0 1
+D_00: -0.37 0.2 0.002 0.001 -0.07
+S_rect_00: 1242 375
+P_rect_00: 721.5 0 609.5 0 0 721.5 172.75 0 0 0 1 0
+"""
+OST = """# oST version 5.0 parameters
+[image]
+width
+752
+height
+480
+[narrow_stereo]
+camera matrix
+458.5 0.000000 367.25
+0.000000 457.25 248.5
+0.000000 0.000000 1.000000
+distortion
+-0.28 0.07 0.0002 0.00002 0.015
+"""
+
 _BAL = bundle_samples.bal_text()
 _BUNDLER = bundle_samples.bundler_text()
 _COLMAP = _encoded(bundle_samples.colmap_texts())
@@ -432,6 +454,15 @@ SAMPLES: dict[str, list[Sample]] = {
         Sample(_one("camera_info.yaml", MESSAGE), check=camera_wrong)
     ],
     "calibration_files.orbslam:read_orbslam": [Sample(_one("settings.yaml", SETTINGS), check=camera_wrong)],
+    "calibration_files.ost:read_ost": [Sample(_one("ost.txt", OST), check=camera_wrong)],
+    "calibration_files.kitti_raw:read_kitti_raw": [
+        Sample(
+            _one("calib_cam_to_cam.txt", RAW),
+            lambda folder, size=size: (folder / "calib_cam_to_cam.txt", size),
+            check=camera_wrong,
+        )
+        for size in ((1242, 375), (1392, 512))
+    ],
     "calibration_files.euroc:read_euroc": [Sample(_one("sensor.yaml", SENSOR), check=camera_wrong)],
     "calibration_files.kalibr:read_kalibr": [Sample(_one("camchain.yaml", KALIBR), check=camera_wrong)],
     "calibration_files.opencv_storage:read_opencv": [

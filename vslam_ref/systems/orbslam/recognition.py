@@ -109,7 +109,7 @@ class RecognitionSettings:
             raise ValueError(f"{self}: need pixels and square above 0, and 1 <= likely <= sure")
 
 
-class DescribedPicture(NamedTuple):
+class WordedPicture(NamedTuple):
     """Features of a picture, and their words.
 
     Attributes
@@ -173,11 +173,11 @@ NOTHING = Verified(-1, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
 def described(
     vocabulary: Vocabulary, uv: Array, angle: Array, descriptor: NDArray[np.uint8], level: int
-) -> DescribedPicture:
+) -> WordedPicture:
     """Give features ``uv (N, 2)``, pixels, with ``angle (N,)``, radians, and ``descriptor (N, 32)`` words."""
     leaf = descend(vocabulary, descriptor).node
     seen = bag(vocabulary, vocabulary.word[leaf])
-    return DescribedPicture(uv, angle, descriptor, nodes_at_level(vocabulary, leaf, level), seen)
+    return WordedPicture(uv, angle, descriptor, nodes_at_level(vocabulary, leaf, level), seen)
 
 
 def proposed(
@@ -228,8 +228,8 @@ def proposed(
 
 
 def verified(
-    a: DescribedPicture,
-    b: DescribedPicture,
+    a: WordedPicture,
+    b: WordedPicture,
     entry: int,
     rng: np.random.Generator,
     settings: RecognitionSettings,
@@ -275,7 +275,7 @@ class Recogniser:
         self.vocabulary, self.rng = vocabulary, rng
         self.settings = settings or RecognitionSettings()
         self.index = Database(vocabulary.words)
-        self.pictures: list[DescribedPicture] = []
+        self.pictures: list[WordedPicture] = []
         self._before = NOTHING
 
     def see(self, uv: Array, angle: Array, descriptor: NDArray[np.uint8]) -> Recognition:

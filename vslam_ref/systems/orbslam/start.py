@@ -34,7 +34,7 @@ BIN = 2 * np.pi / 30
 
 
 @dataclass(frozen=True)
-class Matched:
+class StartMatches:
     """A first picture and what later ones show of it.
 
     Attributes
@@ -65,16 +65,20 @@ class Matched:
         return float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
 
 
-def begin(picture: DescribedPicture, s: StartSettings) -> Matched:
+def begin(picture: DescribedPicture, s: StartSettings) -> StartMatches:
     """Take a picture as the first."""
     f = picture.features
     feature = np.where(f.octave < s.octaves, np.arange(len(f.uv)), -1)
-    return Matched([picture], f.uv[None], feature, f.uv)
+    return StartMatches([picture], f.uv[None], feature, f.uv)
 
 
 def go_on(
-    matched: Matched, picture: DescribedPicture, shape: tuple[int, int], s: StartSettings, f: FeatureSettings
-) -> Matched:
+    matched: StartMatches,
+    picture: DescribedPicture,
+    shape: tuple[int, int],
+    s: StartSettings,
+    f: FeatureSettings,
+) -> StartMatches:
     """Match the first picture with the next, near where its features were found last; ``shape`` (H, W)."""
     a, b = matched.pictures[0].features, picture.features
     places = Places(
@@ -86,7 +90,7 @@ def go_on(
     feature[rows[~same_turn(a, rows, b, feature[rows])]] = -1
     found = feature >= 0
     now = np.where(found[:, None], b.uv[feature], np.nan) if len(b.uv) else np.full_like(matched.last, np.nan)
-    return Matched(
+    return StartMatches(
         [*matched.pictures, picture],
         np.concatenate([matched.places, now[None]]),
         feature,
@@ -107,13 +111,13 @@ def same_turn(a: OrbFeatures, i: IntArray, b: OrbFeatures, j: IntArray) -> BoolA
     return np.asarray(np.isin(each, fullest))
 
 
-def too_few(matched: Matched, s: StartSettings) -> str:
+def too_few(matched: StartMatches, s: StartSettings) -> str:
     """Why a picture that just became the first leads nowhere, or nothing."""
     count = len(matched.rows)
     return f"{count} features in a picture: need {s.least_matches}" if count < s.least_matches else ""
 
 
-def worn(matched: Matched, s: StartSettings) -> str:
+def worn(matched: StartMatches, s: StartSettings) -> str:
     """Why the newest picture becomes the first, or nothing."""
     if len(matched.rows) < s.least_matches:
         return f"{len(matched.rows)} features were found again: need {s.least_matches}, begun anew"
@@ -122,7 +126,7 @@ def worn(matched: Matched, s: StartSettings) -> str:
     return ""
 
 
-def too_early(matched: Matched, s: StartSettings) -> str:
+def too_early(matched: StartMatches, s: StartSettings) -> str:
     """Why no start is tried yet, or nothing."""
     moved, count = matched.moved(-1), len(matched.pictures) - 1
     if moved < s.least_motion:
@@ -133,7 +137,7 @@ def too_early(matched: Matched, s: StartSettings) -> str:
 
 
 def attempt(
-    camera: Camera, matched: Matched, s: StartSettings, scale: float, rng: np.random.Generator
+    camera: Camera, matched: StartMatches, s: StartSettings, scale: float, rng: np.random.Generator
 ) -> Attempt | str:
     """Try to start from the first picture, the newest and one between; a sentence if that is nothing.
 
@@ -147,7 +151,9 @@ def attempt(
     return judge_start(camera, pair, _between(camera, matched, s, rng), s, rng)
 
 
-def _between(camera: Camera, matched: Matched, s: StartSettings, rng: np.random.Generator) -> Between | None:
+def _between(
+    camera: Camera, matched: StartMatches, s: StartSettings, rng: np.random.Generator
+) -> Between | None:
     """The picture that lies half way, by how far the features had moved; None without one.
 
     A corner may have been found beside its place there: what fits no motion from the first picture is left
@@ -170,7 +176,7 @@ def _between(camera: Camera, matched: Matched, s: StartSettings, rng: np.random.
 
 
 def first_map(
-    camera: Camera, shape: tuple[int, int], matched: Matched, found: Attempt, settings: Settings
+    camera: Camera, shape: tuple[int, int], matched: StartMatches, found: Attempt, settings: Settings
 ) -> FeatureMap:
     """Make a map of two keyframes from a start; the median depth in the first is 1, in its own unit.
 

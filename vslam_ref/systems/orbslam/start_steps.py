@@ -27,19 +27,19 @@ class MatchingSteps:
         """Features that are needed."""
         return self.settings.start.least_matches
 
-    def begin(self, picture: DescribedPicture) -> start.Matched:
+    def begin(self, picture: DescribedPicture) -> start.StartMatches:
         """Take a picture as the first."""
         return start.begin(picture, self.settings.start)
 
-    def go_on(self, matched: start.Matched, picture: DescribedPicture) -> start.Matched:
+    def go_on(self, matched: start.StartMatches, picture: DescribedPicture) -> start.StartMatches:
         """Match the first with the next."""
         return start.go_on(matched, picture, self.shape, self.settings.start, self.settings.features)
 
-    def count(self, matched: start.Matched) -> int:
+    def count(self, matched: start.StartMatches) -> int:
         """Features that the newest shows."""
         return len(matched.rows)
 
-    def attempt(self, matched: start.Matched) -> Attempt | str:
+    def attempt(self, matched: start.StartMatches) -> Attempt | str:
         """Try to start from the first, the newest, and one between."""
         s = self.settings
         return start.attempt(self.camera, matched, s.start, s.features.scale, self.rng)
