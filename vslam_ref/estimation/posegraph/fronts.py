@@ -100,7 +100,7 @@ def solve_in_order(data: Array, indices: IntArray, indptr: IntArray, fronts: Fro
     Parameters
     ----------
     data, indices, indptr : ndarray, shapes (entries,), (entries,) and (q + 1,)
-        A, column by column, both triangles; rows of a column are sorted.
+        A, column by column, both triangles; rows of a column are sorted.  Numbers of 32 bits, as SciPy's.
     fronts : Fronts
         Of the blocks of A, of q / k unknowns each.
     b : ndarray, shape (q,)
@@ -113,7 +113,8 @@ def solve_in_order(data: Array, indices: IntArray, indptr: IntArray, fronts: Fro
     Examples
     --------
     >>> _, one = make_fronts(np.array([0, 1]), np.array([0]))
-    >>> solve_in_order(np.array([4.0]), np.array([0]), np.array([0, 1]), one, np.array([2.0])).tolist()
+    >>> row, start = np.array([0], np.int32), np.array([0, 1], np.int32)
+    >>> solve_in_order(np.array([4.0]), row, start, one, np.array([2.0])).tolist()
     [0.5]
     """
     from scipy.sparse import csc_array
