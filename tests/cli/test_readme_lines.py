@@ -23,6 +23,7 @@ SLOW = ("vslam-ref reproduce ", "vslam-ref bench")
 MAKES = {
     "run iekf-slam": "out/robot/report.html",
     "run ptam": "out/desk/report.html",
+    "run orbslam": "out/orb/report.html",
     "ba": "scene.ply",
     "posegraph": "rounds.svg",
     "calibrate": "camera.yaml",

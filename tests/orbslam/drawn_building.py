@@ -92,16 +92,22 @@ def draw_walk(
     density: int = 11,
     drift: float = 1.25,
     look_alike: bool = False,
+    twin: bool = False,
 ) -> Walk:
-    """Walk, and map.  ``look_alike``: the third side has descriptors of the first one, elsewhere on it."""
+    """Walk, and map.  ``look_alike``: the third side has descriptors of the first one, elsewhere on it.
+
+    ``twin``: at the same places on it, so that both sides look alike in every point.
+    """
     rng = np.random.default_rng(seed)
     true, X = walk_poses(laps), wall_points(rng, density)
     word = rng.integers(0, 256, (len(X), 32), dtype=np.uint8)
-    if look_alike:
+    if look_alike or twin:
         first, third = (np.flatnonzero(sign * X[:, 1] > SIDE / 2 - 1.5) for sign in (-1.0, 1.0))
         count = min(len(first), len(third))
         first, third = first[np.argsort(X[first, 0])[:count]], third[np.argsort(-X[third, 0])[:count]]
         word[third] = word[first]  # at about the same place along the wall, at any height and depth
+        if twin:
+            X[third] = X[first] * [-1.0, -1.0, 1.0]
     made, shows, scale = FeatureMap(CAMERA, SHAPE, 8, 1.2), [], drift ** (np.arange(len(true)) / len(true))
     T = [true[0]]
     for k in range(1, len(true)):

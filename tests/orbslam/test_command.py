@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +16,13 @@ pytest.importorskip("cv2", reason="pictures and films need OpenCV")
 import cv2
 
 from vslam_ref import cli
+from vslam_ref.commands import run_visual
 from vslam_ref.datasets import trajectories
+from vslam_ref.datasets.vocabulary_files import write_text
+from vslam_ref.experiments.visual_slam.kinds import ORBSLAM
+from vslam_ref.features.vocabulary import train
+from vslam_ref.support.errors import InputError
+from vslam_ref.systems.orbslam.loops import LoopCloser
 
 QUICK = ["--set", "features.features=600", "--set", "features.octaves=4"]
 
@@ -53,6 +62,16 @@ def test_a_run_leaves_paths_map_and_numbers(tmp_path: Path) -> None:
     assert "ORB-SLAM on desk" in (out / "report.html").read_text()
 
 
+def test_why_loops_were_rejected_is_told_in_a_line() -> None:
+    system = SimpleNamespace(close_loops=LoopCloser(lambda m, kf: [], np.random.default_rng(0)))
+    assert ORBSLAM.notes(system) == []
+    system.close_loops.rejected.update(["few matches", "few inliers", "few matches"])
+    assert ORBSLAM.notes(system) == [
+        "3 keyframes that looked like an earlier place closed no loop: few matches 2, few inliers 1"
+    ]
+    assert ORBSLAM.notes(SimpleNamespace(close_loops=None)) == []
+
+
 def test_a_bare_scene_ends_without_a_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "bare"
     folder.mkdir()
@@ -67,6 +86,46 @@ def test_a_bare_scene_ends_without_a_start(tmp_path: Path, capsys: pytest.Captur
     assert told["tracked"] == told["keyframes"] == 0
     assert "note: no start:" in capsys.readouterr().out
     assert not (out / "trajectory.txt").exists()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"PK\x03\x04 no archive", b"10 6 0 0\n0 1 2\n"])
+def test_a_bad_vocabulary_is_one_line(
+    content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given, out = tmp_path / "words.txt", tmp_path / "out"
+    if content is not None:
+        given.write_bytes(content)
+    assert cli.main(["run", "orbslam", "desk", "--vocabulary", str(given), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert str(given) in said
+    assert not out.exists()
+
+
+def test_a_vocabulary_in_the_folder_that_is_replaced_is_refused(tmp_path: Path) -> None:
+    given = tmp_path / "words.npz"
+    given.touch()
+    options = Namespace(
+        out=str(tmp_path), source="desk", camera=None, truth=None, times=None, vocabulary=str(given)
+    )
+    with pytest.raises(InputError, match=r"--vocabulary .* is replaced"):
+        run_visual.keep_inputs(options)
+
+
+def test_the_vocabulary_that_is_given_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def follow(sequence: object, settings: object, interrupted: object, **given: Any) -> None:
+        asked.append(given["vocabulary"].words)
+        raise InputError("seen enough")
+
+    monkeypatch.setattr(run_visual, "follow", follow)
+    rng = np.random.default_rng(0)
+    few = train([rng.integers(0, 256, (50, 32), np.uint8) for _ in range(2)], rng, branching=3, levels=2)
+    write_text(tmp_path / "words.txt", few)
+    given = ["--vocabulary", str(tmp_path / "words.txt")]
+    assert cli.main(["run", "orbslam", "desk", "--out", str(tmp_path / "out"), *given]) == 2
+    assert asked == [few.words]
 
 
 def test_a_setting_that_means_nothing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

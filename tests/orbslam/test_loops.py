@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vslam_ref.features.orb import OrbFeatures
 from vslam_ref.features.vocabulary import train
 from vslam_ref.geometry import se3, sim3, so3
 from vslam_ref.systems.orbslam import spanning_tree
@@ -19,6 +20,7 @@ from vslam_ref.systems.orbslam.loops import CandidatesByWords, LoopCloser, LoopS
 from vslam_ref.systems.orbslam.loops.consistency import Consistency
 from vslam_ref.systems.orbslam.loops.join import join, rescaled
 from vslam_ref.systems.orbslam.loops.verify import camera_at, matched, verify
+from vslam_ref.systems.orbslam.settings import Settings
 from vslam_ref.systems.visual_map.telling import Pose
 
 
@@ -46,7 +48,8 @@ def rng(seed: int = 0) -> np.random.Generator:
 
 def walked(walk: Any, candidates: Callable[..., list[int]], **settings: Any) -> LoopCloser:
     """The closer, after it has seen all keyframes one after the other."""
-    closer = LoopCloser(candidates, rng(), LoopSettings(**{"theta_min": 50, "apart": 100} | settings))
+    loops = LoopSettings(**{"theta_min": 50, "apart": 100} | settings)
+    closer = LoopCloser(candidates, rng(), Settings(loops=loops))
     for kf in range(len(walk.true)):
         closer(walk.map, kf)
     return closer
@@ -116,6 +119,16 @@ def test_a_look_alike_is_rejected_counted_and_leaves_the_map_as_it_was() -> None
     assert closer.rejected.keys() == {"no similarity"}
     assert closer.rejected["no similarity"] >= 5
     assert (walk.map.T_kf_world.tobytes(), walk.map.X_world.tobytes()) == (T, X)
+
+
+def test_a_side_that_is_a_copy_of_another_is_told_by_the_turn_it_asks_for() -> None:
+    """Every point agrees; but two sides ahead the path has turned by 180 degrees, and drift by none."""
+    walk = BUILDING.draw_walk(1, laps=0.8, twin=True)
+    closer = walked(walk, lambda _, kf: [max(kf - 28, 0)])
+    assert closer.closed == []
+    assert closer.rejected["implausible turn"] >= 3
+    fooled = walked(BUILDING.draw_walk(1, laps=0.8, twin=True), lambda _, kf: [max(kf - 28, 0)], turn=180.0)
+    assert len(fooled.closed) == 1
 
 
 def test_a_walk_with_look_alikes_closes_the_true_loop_only() -> None:
@@ -223,6 +236,7 @@ def test_the_same_walk_and_seed_give_the_same_bytes() -> None:
 
 def test_words_propose_the_place_of_the_first_lap() -> None:
     walk = BUILDING.draw_walk(1, laps=1.15)
+    features = [walk.map.features(kf) for kf in range(len(walk.true))]
     sightings = walk.map.sightings
     vocabulary = train(
         [sightings["descriptor"][walk.map.features(kf)] for kf in range(0, 50, 3)],
@@ -231,8 +245,14 @@ def test_words_propose_the_place_of_the_first_lap() -> None:
         rng=rng(),
     )
     words = CandidatesByWords(vocabulary)
-    for kf in range(len(walk.true)):
-        assert (walk.map.covisible(kf)[words(walk.map, kf)] < 15).all()
+    for kf in range(1, len(walk.true)):  # the first one is remembered though nobody asked for it
+        found = words(walk.map, kf)
+        assert (walk.map.covisible(kf)[found] < 15).all()
+        assert all(k < kf for k in found)
+    for kf in (0, 7, 30):
+        like = OrbFeatures(*[None] * 4, walk.map.sightings["descriptor"][features[kf]])  # type: ignore[arg-type]
+        assert words.alike(walk.map, like, 3)[0] == kf
+        assert len(words.alike(walk.map, like, 3)) == 3
     closer = walked(walk, CandidatesByWords(vocabulary))
     assert len(closer.closed) == 1
     assert closer.closed[0].candidate < 12

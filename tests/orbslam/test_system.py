@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from vslam_ref.datasets.vocabulary_files import shipped_vocabulary
 from vslam_ref.geometry import camera_pose
 from vslam_ref.geometry.alignment import align
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems.orbslam import OrbSlam, Settings, start
+from vslam_ref.systems.orbslam.feature_map import FeatureMap
+from vslam_ref.systems.orbslam.loops import CandidatesByWords, LoopCloser, LoopSettings
 from vslam_ref.systems.orbslam.mapper import mapper
 from vslam_ref.systems.orbslam.settings import FeatureSettings, TrackerSettings
 from vslam_ref.systems.visual_map.chosen_start import ChosenStart
@@ -30,6 +34,17 @@ class Run(NamedTuple):
     system: OrbSlam
     outcomes: list[PictureOutcome]
     called: list[int]
+
+
+@dataclass
+class NotedCloser(LoopCloser):
+    """Notes the keyframes that it is called for."""
+
+    called: list[int] = field(default_factory=list)
+
+    def __call__(self, feature_map: FeatureMap, kf: int) -> np.ndarray | None:
+        self.called.append(kf)
+        return super().__call__(feature_map, kf)
 
 
 LARGEST_SHARE = 0.009
@@ -58,11 +73,12 @@ def film() -> Film:
 @pytest.fixture(scope="module")
 def desk(film: Film) -> Run:
     """The film once, then three blank pictures and one from the middle of the film."""
-    called: list[int] = []
-    system = OrbSlam(film.camera, close_loops=lambda _, kf: bool(called.append(kf)))
+    words = shipped_vocabulary()
+    closer = NotedCloser(CandidatesByWords(words), np.random.default_rng(0))
+    system = OrbSlam(film.camera, vocabulary=words, close_loops=closer)
     blank = [np.full_like(film.pictures[0], 120)] * 3
     shown = [*film.pictures, *blank, film.pictures[20]]
-    return Run(system, [system.step(k, grey) for k, grey in enumerate(shown)], called)
+    return Run(system, [system.step(k, grey) for k, grey in enumerate(shown)], closer.called)
 
 
 def test_every_picture_has_a_pose_those_before_the_start_too(film: Film, desk: Run) -> None:
@@ -125,8 +141,21 @@ def test_without_relocalisation_it_stays_lost(film: Film) -> None:
     assert [o.tracked.quality for o in outcomes] == [Quality.LOST] * 2
 
 
-def test_the_same_pictures_give_the_same_bytes(film: Film, desk: Run) -> None:
-    again = OrbSlam(film.camera)
+def test_loops_are_looked_for_with_a_vocabulary_unless_they_are_left_out(film: Film) -> None:
+    words = shipped_vocabulary()
+    left_out = Settings(loops=LoopSettings(close=False))
+    assert OrbSlam(film.camera).close_loops is None
+    assert OrbSlam(film.camera, left_out, vocabulary=words).close_loops is None
+    wanted = Settings(seed=3, loops=LoopSettings(apart=7))
+    closer = OrbSlam(film.camera, wanted, vocabulary=words).close_loops
+    assert closer is not None
+    assert closer.loops.apart == 7
+
+
+@pytest.mark.parametrize("close", [True, False])
+def test_the_same_pictures_give_the_same_bytes(film: Film, desk: Run, close: bool) -> None:
+    """Whether loops are looked for or not, where there is none."""
+    again = OrbSlam(film.camera, Settings(loops=LoopSettings(close=close)), vocabulary=shipped_vocabulary())
     for k in range(18):
         again.step(k, film.pictures[k])
     live = [desk.system.poses[k].live for k in range(18)]

@@ -75,8 +75,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(options: argparse.Namespace, kind: SystemKind, settings: Any, *, concurrent: bool = False) -> int:
-    """Run a system over the pictures, print and write what there is to tell."""
+def run(options: argparse.Namespace, kind: SystemKind, settings: Any, **given: Any) -> int:
+    """Run a system over the pictures, print and write what there is to tell.
+
+    What else is given goes to :func:`vslam_ref.experiments.visual_slam.running.run`.
+    """
     import time
 
     target, out = json_target(options), folder_target(options.out)
@@ -93,7 +96,7 @@ def run(options: argparse.Namespace, kind: SystemKind, settings: Any, *, concurr
     warm(*kind.kernels)
     with files.new_folder(out) as folder, interrupts() as interrupted:
         began = time.perf_counter()
-        done = follow(sequence, settings, chosen, concurrent, interrupted)
+        done = follow(sequence, settings, interrupted, chosen=chosen, **given)
         draw(folder / report.FILM, done, options.video, interrupted)
         content = numbers.document(done, time.perf_counter() - began)
         report.write_report(folder, done, content)
@@ -112,7 +115,7 @@ def keep_inputs(options: argparse.Namespace) -> None:
 
     out = Path(options.out).resolve()
     given = {"SOURCE": options.source, "--camera": options.camera, "--truth": options.truth,
-             "--times": options.times}  # fmt: skip
+             "--times": options.times, "--vocabulary": vars(options).get("vocabulary")}  # fmt: skip
     for name, path in given.items():
         if path is not None and Path(path).exists() and Path(path).resolve().is_relative_to(out):
             raise InputError(f"{name} {path} lies in --out {options.out}, which is replaced: give another")
@@ -165,20 +168,12 @@ def chosen_start(pictures: tuple[int, int] | None, sequence: Sequence) -> Chosen
     return ChosenStart(*pictures)
 
 
-def follow(
-    sequence: Sequence,
-    settings: Any,
-    chosen: ChosenStart | None,
-    concurrent: bool,
-    interrupted: Interrupts,
-) -> Run:
+def follow(sequence: Sequence, settings: Any, interrupted: Interrupts, **given: Any) -> Run:
     """Run with a progress bar; Ctrl-C ends it after the picture."""
     from vslam_ref.experiments.visual_slam import running
 
     with progress_bar(len(sequence), "picture", "tracking") as bar:
-        done = running.run(
-            sequence, settings, lambda _: interrupted.asked, bar.update, chosen=chosen, concurrent=concurrent
-        )
+        done = running.run(sequence, settings, lambda _: interrupted.asked, bar.update, **given)
     done.interrupted |= interrupted.asked  # perhaps at the last picture
     interrupted.asked = False  # the next ends the film
     interrupted.ends = "ending the film, saving the run (again: stop at once, save nothing)"

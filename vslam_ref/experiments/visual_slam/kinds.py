@@ -8,6 +8,8 @@ from typing import Any, NamedTuple, Protocol
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
+from vslam_ref.datasets.vocabulary_files import shipped_vocabulary
+from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.systems import orbslam, ptam
 from vslam_ref.systems.visual_map import KeyframeMap
@@ -62,13 +64,16 @@ class SystemKind(NamedTuple):
         In commands; in texts.
     settings : type
     make : callable
-        From a camera, settings, a chosen start or None, and whether mapping has a thread of its own.
+        From a camera, settings, a chosen start or None, whether mapping has a thread of its own, and a
+        vocabulary or None for the one that comes with the package.
     stages, mapping : tuple of str
         Of a step, in their order; those of a picture that becomes a keyframe.
     kernels : tuple of str
         Modules of compiled loops.
     counts : callable
         Further numbers of a run, by their keys.
+    notes : callable
+        What a reader of these should know, in lines.
     rows : tuple of (str, str, str)
         Their words and units, for the table.
     width : callable
@@ -78,25 +83,43 @@ class SystemKind(NamedTuple):
     name: str
     title: str
     settings: type
-    make: Callable[[Camera, Any, ChosenStart | None, bool], VisualSystem]
+    make: Callable[[Camera, Any, ChosenStart | None, bool, Vocabulary | None], VisualSystem]
     stages: tuple[str, ...]
     mapping: tuple[str, ...]
     kernels: tuple[str, ...]
     counts: Callable[[Any], Mapping[str, int]]
+    notes: Callable[[Any], list[str]]
     rows: tuple[tuple[str, str, str], ...]
     width: Callable[[Any], float]
 
 
-def _make_ptam(camera: Camera, settings: Any, chosen: ChosenStart | None, concurrent: bool) -> VisualSystem:
+def _make_ptam(
+    camera: Camera, settings: Any, chosen: ChosenStart | None, concurrent: bool, vocabulary: Vocabulary | None
+) -> VisualSystem:
+    if vocabulary is not None:
+        raise ValueError("ptam: its patches have no words; give no vocabulary")
     return (ptam.ConcurrentPtam if concurrent else ptam.Ptam)(camera, settings, chosen)
 
 
 def _make_orbslam(
-    camera: Camera, settings: Any, chosen: ChosenStart | None, concurrent: bool
+    camera: Camera, settings: Any, chosen: ChosenStart | None, concurrent: bool, vocabulary: Vocabulary | None
 ) -> VisualSystem:
     if concurrent:
         raise ValueError("orbslam: its mapper has no thread of its own")
-    return orbslam.OrbSlam(camera, settings, chosen)
+    return orbslam.OrbSlam(
+        camera, settings, chosen, shipped_vocabulary() if vocabulary is None else vocabulary
+    )
+
+
+def _rejected_loops(system: Any) -> list[str]:
+    """Why loops were rejected, in a line."""
+    closer = system.close_loops
+    if closer is None or not closer.rejected:
+        return []
+    reasons = ", ".join(f"{reason} {count}" for reason, count in closer.rejected.most_common())
+    return [
+        f"{closer.rejected.total()} keyframes that looked like an earlier place closed no loop: {reasons}"
+    ]
 
 
 PTAM = SystemKind(
@@ -108,6 +131,7 @@ PTAM = SystemKind(
     ("start", "look again", "new points", "neighbours", "local", "global"),
     ptam.KERNELS,
     lambda system: {},
+    lambda system: [],
     (),
     lambda settings: 2.0,
 )
@@ -120,6 +144,7 @@ ORBSLAM = SystemKind(
     ("start", "keyframe in", "new points", "fuse", "local", "cull", "loops"),
     orbslam.KERNELS,
     lambda system: system.counts(),
+    _rejected_loops,
     (
         ("culled_keyframes", "keyframes that were culled", ""),
         ("loops", "loops that were closed", ""),

@@ -213,7 +213,7 @@ def notes(run: Run, final: Accuracy) -> list[str]:
         told.append(f"no start: {reason}")
     elif final.reason:
         told.append(f"no error against the truth: {final.reason}")
-    return told + camera_notes(run)
+    return told + run.kind.notes(run.system) + camera_notes(run)
 
 
 def number_rows(content: Mapping[str, Any]) -> list[list[str]]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.datasets.sequences import Image, Sequence
 from vslam_ref.experiments.visual_slam.kinds import SystemKind, VisualSystem, kind_of
+from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.systems.ptam import ConcurrentPtam
 from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, TrackedPicture
@@ -157,6 +158,7 @@ def run(
     *,
     chosen: ChosenStart | None = None,
     concurrent: bool = False,
+    vocabulary: Vocabulary | None = None,
 ) -> Run:
     """Run a system over a sequence.
 
@@ -174,6 +176,8 @@ def run(
         Two pictures to start from.
     concurrent : bool
         With the mapper in a thread of its own.
+    vocabulary : Vocabulary, optional
+        For ORB-SLAM; by default the one that comes with the package.
 
     Raises
     ------
@@ -182,7 +186,7 @@ def run(
     """
     if sequence.camera is None:
         raise ValueError(f"{sequence.name} has no camera: need one")
-    system = kind_of(settings).make(sequence.camera, settings, chosen, concurrent)
+    system = kind_of(settings).make(sequence.camera, settings, chosen, concurrent, vocabulary)
     done = Run(sequence, settings, system, concurrent=concurrent)
     with closing(system):
         for image in sequence:

@@ -18,6 +18,7 @@ module              holds
 ``recognition``     places that were seen before, in pictures alone
 ``essential_graph`` the pairs along which the error of a loop is spread
 ``loops``           loop closing
+``loop_settings``   its numbers
 ==================  ==============================================================================
 
 A system takes pictures; it opens no files and draws nothing.
@@ -27,7 +28,8 @@ from vslam_ref.systems.orbslam.orbslam import STAGES, OrbSlam
 from vslam_ref.systems.orbslam.settings import Settings
 
 KERNELS = (
-    "bundle", "bundle_schur", "curves", "features", "hamming", "orb", "points", "pose", "windows",
+    "bundle", "bundle_schur", "curves", "features", "fronts", "hamming", "orb", "points", "pose",
+    "vocabulary", "windows",
 )  # fmt: skip
 """Modules of compiled loops that a run needs, for those who prepare them before they look at a clock."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
+from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.support.stopwatch import Stopwatch, stage
@@ -24,6 +25,7 @@ from vslam_ref.systems.orbslam.feature_map import DescribedPicture, FeatureMap
 from vslam_ref.systems.orbslam.look import describe_picture
 from vslam_ref.systems.orbslam.loops.closer import LoopCloser
 from vslam_ref.systems.orbslam.loops.join import rescaled
+from vslam_ref.systems.orbslam.loops.words import CandidatesByWords
 from vslam_ref.systems.orbslam.mapper.adjusting import adjust_all, robust
 from vslam_ref.systems.orbslam.mapper.mapper import LocalMapping, map_keyframe
 from vslam_ref.systems.orbslam.policy import CovisibilityPolicy
@@ -35,6 +37,8 @@ from vslam_ref.systems.visual_map.chosen_start import ChosenStart
 from vslam_ref.systems.visual_map.refine_camera import RefinedCamera, refine_camera
 from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, Pose, Quality, Trail, path_of
 
+LOOP_SEED = 1
+"""Beside the seed of the system: samples for loops do not change those of the tracker."""
 NO_LOOPS = {"loops": 0, "loops_rejected": 0, "essential_edges": 0}
 STAGES = (
     "features", "start", "search", "pose", "local map", "recover",
@@ -53,17 +57,25 @@ class OrbSlam:
     settings : Settings, optional
     chosen : ChosenStart, optional
         Two pictures to start from; by default the system finds them.
+    vocabulary : Vocabulary, optional
+        With it, keyframes are found by their words: where loops may close, unless ``settings.loops.close`` is
+        off, and where a lost camera may be.  Without, no loop is looked for.
     close_loops : LoopCloser, optional
-        What looks for loops after each keyframe; none by default.
+        Another that looks for loops after each keyframe.
     """
 
     camera: Camera
     settings: Settings = field(default_factory=Settings)
     chosen: ChosenStart | None = None
+    vocabulary: Vocabulary | None = None
     close_loops: LoopCloser | None = None
 
     def __post_init__(self) -> None:
         s = self.settings
+        self.by_words = None if self.vocabulary is None else CandidatesByWords(self.vocabulary)
+        if self.by_words is not None and self.close_loops is None and s.loops.close:
+            rng = np.random.default_rng([s.seed, LOOP_SEED])
+            self.close_loops = LoopCloser(self.by_words, rng, s)
         self.rng = np.random.default_rng(s.seed)
         self.map: FeatureMap | None = None
         self.matched: start_steps.Matched | None = None
@@ -161,7 +173,10 @@ class OrbSlam:
     def _tracker(self, feature_map: FeatureMap) -> FeatureTracker:
         """A tracker that has seen the second keyframe last."""
         T, points = feature_map.T_kf_world[1].copy(), feature_map.measured_in(1)
-        return FeatureTracker(self.settings, self.rng, T, points, reference=1)
+        tracker = FeatureTracker(self.settings, self.rng, T, points, reference=1)
+        if self.by_words is not None:
+            tracker.candidates = self.by_words.alike
+        return tracker
 
     # --- with a map ---------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from vslam_ref.features.orb import OrbSettings
 from vslam_ref.support.config import assume, settings
+from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.visual_map.refine_camera import CameraSettings
 
 
@@ -128,6 +129,7 @@ class Settings:
     tracker: TrackerSettings = field(default_factory=TrackerSettings)
     keyframe: KeyframeSettings = field(default_factory=KeyframeSettings)
     mapper: MapperSettings = field(default_factory=MapperSettings)
+    loops: LoopSettings = field(default_factory=LoopSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     last_steps: int = assume(40, "", "of the adjustment of everything at the end")
 

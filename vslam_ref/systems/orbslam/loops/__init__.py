@@ -3,7 +3,6 @@
 ================  ===================================================================================
 module            holds
 ================  ===================================================================================
-``settings``      every number, and why it has its value
 ``words``         candidates by the words of a vocabulary
 ``consistency``   a place is believed when three keyframes in a row propose it
 ``verify``        matches, a similarity, more matches by it, the whole place found again
@@ -14,8 +13,8 @@ module            holds
 ================  ===================================================================================
 """
 
+from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.closer import Candidates, LoopCloser
-from vslam_ref.systems.orbslam.loops.settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.verify import LoopVerdict
 from vslam_ref.systems.orbslam.loops.words import CandidatesByWords
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
+from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.consistency import Consistency
 from vslam_ref.systems.orbslam.loops.join import Joined, join
-from vslam_ref.systems.orbslam.loops.settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.verify import LoopVerdict, verify
 from vslam_ref.systems.orbslam.mapper.adjusting import adjust_all
 from vslam_ref.systems.orbslam.settings import Settings
@@ -39,9 +39,8 @@ class LoopCloser:
         Keyframes that may show the place of a keyframe; see :data:`Candidates`.
     rng : numpy.random.Generator
         Draws the samples of the similarity.
-    loops : LoopSettings, optional
     settings : Settings, optional
-        Of the system, for the adjustment of everything.
+        Of the system: of loops, and for the adjustment of everything.
 
     Attributes
     ----------
@@ -55,12 +54,16 @@ class LoopCloser:
 
     candidates: Candidates
     rng: np.random.Generator
-    loops: LoopSettings = field(default_factory=LoopSettings)
     settings: Settings = field(default_factory=Settings)
     closed: list[LoopVerdict] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
     joined: Joined | None = None
     _consistency: Consistency = field(default_factory=Consistency)
+
+    @property
+    def loops(self) -> LoopSettings:
+        """Numbers of loop closing."""
+        return self.settings.loops
 
     def __call__(self, feature_map: FeatureMap, kf: int) -> Array | None:
         """Look at a new keyframe, and close a loop if there is one.

@@ -19,8 +19,8 @@ from vslam_ref.estimation.posegraph import Options
 from vslam_ref.geometry import se3, sim3
 from vslam_ref.systems.orbslam.essential_graph import EssentialEdges, essential_edges
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
+from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.correction import Correction, Loop, close_loop, move_points
-from vslam_ref.systems.orbslam.loops.settings import LoopSettings
 from vslam_ref.systems.orbslam.loops.verify import LoopVerdict, points_around
 from vslam_ref.systems.orbslam.mapper.fuse import fuse
 from vslam_ref.systems.visual_map.telling import Pose

@@ -11,6 +11,8 @@ r"""Do two keyframes show one place?  Matches, a similarity, more matches by it,
       too few agree: no loop
     points of the whole place               of l and its neighbours, looked for in c
       too few found: no loop
+    turn that drift would have made         between where c stands and where the loop puts it
+      too large: a place painted like this one
 
 Points stay in the unit of their side.  The camera c, seen from the side of l, stands at the rigid part of
 :math:`S_{cl} T_{l,world} = [sR, t]`, which is (R, t / s): it projects the points of that side alike.
@@ -27,9 +29,9 @@ from vslam_ref.estimation.similarity import PointMatches, agreeing, estimate_sim
 from vslam_ref.features import hamming
 from vslam_ref.features.orb import OrbFeatures
 from vslam_ref.features.vocabulary import turned_alike
-from vslam_ref.geometry import se3, sim3
+from vslam_ref.geometry import se3, sim3, so3
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
-from vslam_ref.systems.orbslam.loops.settings import LoopSettings
+from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.orbslam.mapper.fuse import features_of
 from vslam_ref.systems.orbslam.projection import expected, find
 
@@ -110,7 +112,17 @@ def verify(
         feature_map, current, candidate, S, FeaturePairs(*(side[good] for side in pairs)), s
     )
     told = told._replace(points=len(point), S_candidate_current=S, feature=feature, point=point)
-    return told if len(point) >= s.least_points else told._replace(reason="few points")
+    if len(point) < s.least_points:
+        return told._replace(reason="few points")
+    if turn_degrees(feature_map, current, camera_at(S, feature_map, candidate)) > s.turn:
+        return told._replace(reason="implausible turn")
+    return told
+
+
+def turn_degrees(feature_map: FeatureMap, kf: int, T_cam_world: Array) -> float:
+    """By how many degrees a pose (4, 4), the map's own unit, is turned against that of a keyframe."""
+    turn = so3.log(T_cam_world[:3, :3] @ feature_map.T_kf_world[kf, :3, :3].T)
+    return float(np.rad2deg(np.linalg.norm(turn)))
 
 
 def matched(feature_map: FeatureMap, current: int, other: int, s: LoopSettings) -> FeaturePairs:

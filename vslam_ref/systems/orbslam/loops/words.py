@@ -12,16 +12,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.features.vocabulary import Bag, Database, Vocabulary, bag, descend, score
+from vslam_ref.arrays import IntArray
+from vslam_ref.features.orb import OrbFeatures
+from vslam_ref.features.vocabulary import Bag, Database, Vocabulary, bag, best, descend, score
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
 from vslam_ref.systems.visual_map import neighbours
+from vslam_ref.systems.visual_map.keyframe_map import Bytes
 
 COMMON, GROUP, NEIGHBOURS, SHARED = 0.8, 0.75, 10, 15
 """Share of the most common words; of the best group's score; neighbours of a group; points of a neighbour."""
 
 
 class CandidatesByWords:
-    """Keyframes by their words; each is remembered when it has been asked for.
+    """Keyframes by their words; each is remembered when it, or a later one, is asked for.
 
     Parameters
     ----------
@@ -30,31 +33,37 @@ class CandidatesByWords:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self.vocabulary = vocabulary
-        self.index = Database(vocabulary.words)
-        self._entry: dict[int, int] = {}  # of a keyframe
-        self._keyframe: list[int] = []  # of an entry
+        self.index = Database(vocabulary.words)  # of all keyframes, by their own numbers
 
     def __call__(self, feature_map: FeatureMap, kf: int) -> list[int]:
-        """Keyframes that may show the place of ``kf``, the best group first; remember ``kf``."""
-        descriptor = feature_map.sightings["descriptor"][feature_map.features(kf)]
-        now = bag(self.vocabulary, self.vocabulary.word[descend(self.vocabulary, descriptor).node])
-        found = self._proposed(feature_map, kf, now)
-        self._entry[kf] = self.index.add(now)
-        self._keyframe.append(kf)
-        return found
-
-    def _proposed(self, feature_map: FeatureMap, kf: int, now: Bag) -> list[int]:
-        shared = feature_map.covisible(kf)
-        near = [k for k in np.flatnonzero(shared >= SHARED).tolist() if k in self._entry]
-        least = min((score(now, self.index.bag(self._entry[k])) for k in near), default=0.0)
-        keyframe = np.array(self._keyframe, dtype=np.int64)
-        found = self.index.query(now, (shared[keyframe] < SHARED) & feature_map.keyframes["alive"][keyframe])
+        """Keyframes older than ``kf`` that may show its place, the best group first."""
+        self._remember(feature_map, kf + 1)
+        now, shared = self.index.bag(kf), feature_map.covisible(kf)
+        near = np.flatnonzero(shared[:kf] >= SHARED).tolist()
+        least = min((score(now, self.index.bag(k)) for k in near), default=0.0)
+        older = np.arange(len(self.index)) < kf
+        used = feature_map.keyframes["alive"][: len(self.index)]
+        found = self.index.query(now, older & used & (shared[: len(self.index)] < SHARED))
         good = (found.common > COMMON * found.common.max(initial=0)) & (found.score >= max(least, 1e-12))
-        of = dict(zip(keyframe[found.entry[good]].tolist(), found.score[good].tolist(), strict=True))
+        of = dict(zip(found.entry[good].tolist(), found.score[good].tolist(), strict=True))
         total: dict[int, float] = {}
         for k in of:
             members = [k, *(m for m in neighbours(feature_map, k, NEIGHBOURS).tolist() if m in of)]
-            best = max(members, key=lambda m: (of[m], -m))
-            total[best] = max(total.get(best, 0.0), sum(of[m] for m in members))
+            first = max(members, key=lambda m: (of[m], -m))
+            total[first] = max(total.get(first, 0.0), sum(of[m] for m in members))
         most = max(total.values(), default=0.0)
         return sorted((k for k in total if total[k] >= GROUP * most), key=lambda k: (-total[k], k))
+
+    def alike(self, feature_map: FeatureMap, features: OrbFeatures, count: int) -> IntArray:
+        """Keyframes (count,) or fewer whose words are most like those of a picture's features."""
+        self._remember(feature_map, len(feature_map.keyframes))
+        found = self.index.query(self._bag(features.descriptor), feature_map.keyframes["alive"])
+        return best(found, count).entry
+
+    def _remember(self, feature_map: FeatureMap, count: int) -> None:
+        """Have the first ``count`` keyframes in the index."""
+        for kf in range(len(self.index), count):
+            self.index.add(self._bag(feature_map.sightings["descriptor"][feature_map.features(kf)]))
+
+    def _bag(self, descriptor: Bytes) -> Bag:
+        return bag(self.vocabulary, self.vocabulary.word[descend(self.vocabulary, descriptor).node])

@@ -12,6 +12,7 @@ from vslam_ref.support.config import assume, settings
 class LoopSettings:
     """When a loop is believed, and how it is closed; every field has its own unit, beside it."""
 
+    close: bool = assume(True, "", "look for loops after each keyframe, and close them")
     consistent: int = assume(3, "keyframes", "in a row that propose one place; ORB-SLAM's")
     apart: int = assume(10, "keyframes", "after a loop before the next one; ORB-SLAM's")
     ratio: float = assume(0.75, "", "of the best to the second distance; ORB-SLAM's")
@@ -25,6 +26,9 @@ class LoopSettings:
     least_inliers: int = assume(20, "points", "that agree on the similarity; ORB-SLAM's")
     wide_radius: float = assume(10.0, "px of the octave", "around the points of the whole place; ORB-SLAM's")
     least_points: int = assume(40, "points", "of the whole place found again; ORB-SLAM's")
+    turn: float = assume(
+        30.0, "degrees", "that drift may have turned the path; more: a look-alike; not in ORB-SLAM"
+    )
     group: int = assume(
         15, "points", "shared by neighbours, which are no candidates, and move as one; ORB-SLAM's"
     )
@@ -36,6 +40,8 @@ class LoopSettings:
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing."""
         for key, _, value, _, _ in settings(self):
+            if isinstance(value, bool):
+                continue
             least = 0 if key in ("apart", "last_steps", "fuse_radius") else 1e-9
             if not (math.isfinite(value) and value >= least):
                 raise ValueError(
