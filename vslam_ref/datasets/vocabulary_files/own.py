@@ -1,13 +1,13 @@
 """Our own form of a vocabulary: a ``.npz`` of few arrays, read without pickle, nothing larger than it says.
 
-=============  ========================================================================
-array          holds
-=============  ========================================================================
-``children``   how many children each node has, level by level (n,), as in the tree
-``descriptor`` bytes of each node but the root (n - 1, 32)
-``weight``     of each word (W,)
-``node``       of each word (W,), only where words stand in another order than leaves
-=============  ========================================================================
+==============  ========================================================================
+array           holds
+==============  ========================================================================
+``children``    how many children each node has, level by level (n,), as in the tree
+``descriptor``  bytes of each node but the root (n - 1, 32)
+``weight``      of each word (W,)
+``node``        of each word (W,), only where words stand in another order than leaves
+==============  ========================================================================
 """
 
 from __future__ import annotations

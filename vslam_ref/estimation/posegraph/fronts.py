@@ -57,8 +57,7 @@ def make_fronts(indptr: IntArray, indices: IntArray) -> tuple[IntArray, Fronts]:
     Returns
     -------
     post : ndarray of int, shape (k,)
-        Which column comes next: each subtree of the elimination tree in one piece, which changes the number
-        of no entry.
+        Which column comes next: each subtree of the elimination tree in one piece.
     fronts : Fronts
         Of the columns in that order.
 

@@ -87,7 +87,7 @@ def essential_edges(
         raise ValueError(f"loop {joined[bad[0]].tolist()}: need two different keyframes of {K}")
     child = np.flatnonzero(above >= 0)
     strong = np.argwhere(np.triu(count >= max(theta_min, 1), 1))
-    pairs = [np.column_stack([child, above[child]]), joined, strong]  # eq-essential
+    pairs = [np.column_stack([child, above[child]]), joined, strong]  # eq-essential-graph
     kind = np.repeat([TREE, LOOP, COVISIBLE], [len(one) for one in pairs])
     every = np.sort(np.concatenate(pairs).astype(np.int64), axis=1)
     _, first = np.unique(every @ [K, 1], return_index=True)  # the first kind that names a pair

@@ -78,7 +78,7 @@ class OrbSlam:
             self.close_loops = LoopCloser(self.by_words, rng, s)
         self.rng = np.random.default_rng(s.seed)
         self.map: FeatureMap | None = None
-        self.matched: start_steps.Matched | None = None
+        self.matched: start_steps.StartMatches | None = None
         self.tracker: FeatureTracker | None = None
         self.policy = CovisibilityPolicy(s.keyframe)
         self.poses: dict[int, Pose] = {}

@@ -31,7 +31,7 @@ def pairs_of(
     tree = {(min(k, p), max(k, p)) for k, p in enumerate(parent) if p >= 0}
     joined = {(min(i, j), max(i, j)) for i, j in loops}
     strong = {(i, j) for i in range(K) for j in range(i + 1, K) if shared[i, j] >= theta_min}
-    return sorted(tree | joined | strong)  # eq-essential
+    return sorted(tree | joined | strong)  # eq-essential-graph
 
 
 def closed(
