@@ -236,7 +236,7 @@ BAD = [
     (["--module", "no_such_file.py"], "no such file: no_such_file.py"),
     (["--program", "/no/such/adapter"], "No such file"),
     (["--module", "no_such_module_here"], "no_such_module_here"),
-    (["--self", "--chapter", "14"], "no vectors of that chapter"),
+    (["--self", "--chapter", "18"], "no vectors of that chapter"),
     (["--self", "--topic", "so4"], "no vectors of that chapter or topic"),
     (["--self", "--case", "so3.exp/none-01"], "no case 'so3.exp/none-01'"),
     (["--self", "--timeout", "0"], "--timeout 0"),

@@ -352,8 +352,8 @@ def test_selections_add_up() -> None:
 
 
 UNKNOWN = [
-    ({"chapters": [14]}, "no vectors of that chapter or topic: chapter 14"),
-    ({"chapters": [2, 14]}, "chapter 14"),
+    ({"chapters": [18]}, "no vectors of that chapter or topic: chapter 18"),
+    ({"chapters": [2, 18]}, "chapter 18"),
     ({"topics": ["so2", "so4"]}, "topic so4"),
     ({"functions": ["so3.epx"]}, "did you mean so3.exp"),
     ({"functions": ["so2.exp", "zzzzzz"]}, "no function 'zzzzzz'"),

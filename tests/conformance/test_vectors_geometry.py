@@ -1,4 +1,4 @@
-"""Vectors of chapters 01 to 06, 08 to 11, 13 and 23: a plain program passes, mistakes are told by name."""
+"""Vectors of chapters 01-06, 08-11, 13, 14 and 23: a plain program passes, mistakes are told by name."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import plain_estimates
 import plain_features
 import plain_mapping
 import plain_motions
+import plain_orbslam
 import plain_posegraph
 import plain_tracking
 import plain_two_views
@@ -35,12 +36,13 @@ PROGRAM: dict[str, Callable[..., Any]] = {
     **plain_mapping.PROGRAM,
     **plain_tracking.PROGRAM,
     **plain_posegraph.PROGRAM,
+    **plain_orbslam.PROGRAM,
     **plain_two_views.PROGRAM,
 }
 FILES = [
     name
     for name in form.names()
-    if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "11", "13", "23")
+    if name[:2] in ("01", "02", "03", "04", "05", "06", "08", "09", "10", "11", "13", "14", "23")
 ]
 MISTAKES = mistakes(FILES)
 MOST_LOST = 3
@@ -68,7 +70,7 @@ def test_all_topics_are_there() -> None:
     assert topics >= {
         *("multiview", "so2", "se2", "so3", "quaternion", "se3", "sim3", "camera", "loss", "scale", "noise"),
         *("least_squares", "bundle", "trajectory", "format", "features", "two_views", "tracking"),
-        *("mapping", "posegraph"),
+        *("mapping", "posegraph", "orb", "vocabulary", "loops"),
     }
 
 

@@ -55,6 +55,17 @@ def test_plain_loops_describe_the_same(wall: Bytes) -> None:
         assert bits[k].tolist() == book.descriptor(wall, *xy[k].tolist(), float(theta[k]), PAIRS)
 
 
+def test_pairs_of_ones_own(wall: Bytes) -> None:
+    """The first sixteen pairs give the first two bytes; pairs that would leave the border are refused."""
+    smoothed, at, right = smooth(wall), [[60, 60]], [[0.6, 0.8]]
+    two = describe(smoothed, at, right, PAIRS[:16])
+    np.testing.assert_array_equal(two, describe(smoothed, at, right)[:, :2])
+    with pytest.raises(ValueError, match="whole bytes"):
+        describe(smoothed, at, right, PAIRS[:9])
+    with pytest.raises(ValueError, match="more than 19 from the centre"):
+        describe(smoothed, at, right, np.array([[0, 0, 14, 14]] * 8))
+
+
 def test_which_pixel_decides_which_bit() -> None:
     """A single brighter pixel under the second point of a pair sets its bit; under the first, it does not."""
     for number in (0, 7, 8, 255):

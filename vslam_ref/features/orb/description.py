@@ -62,8 +62,8 @@ def _smooth(image: Bytes) -> Bytes:
     return smoothed
 
 
-def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
-    """Describe patches of a smoothed picture by 256 comparisons.
+def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike, pairs: IntArray = PAIRS) -> Bytes:
+    """Describe patches of a smoothed picture by comparisons of pairs of pixels, 256 by default.
 
     Implements :eq:`eq-orb-test`.
 
@@ -74,17 +74,19 @@ def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
         Pixels (x, y), at least 19 from the border.
     direction : array_like, shape (n, 2)
         Unit vectors (cos, sin) of the patches' angles.
+    pairs : ndarray of int, shape (8 b, 4)
+        Offsets x, y, x, y of both pixels, at most 19 from the centre.
 
     Returns
     -------
-    ndarray of uint8, shape (n, 32)
+    ndarray of uint8, shape (n, b), by default (n, 32)
         Bit k of byte j is set if the first pixel of pair 8 j + k is darker than the second.
 
     Raises
     ------
     ValueError
-        If the picture is not grey with 8 bits, a pixel is nearer to the border, or a direction's length
-        is not 1.
+        If the picture is not grey with 8 bits, a pixel is nearer to the border, a direction's length
+        is not 1, or pairs are not as said.
 
     Examples
     --------
@@ -99,7 +101,11 @@ def describe(smoothed: ArrayLike, xy: ArrayLike, direction: ArrayLike) -> Bytes:
     off = ~(np.abs(np.hypot(unit[:, 0], unit[:, 1]) - 1) <= UNIT)
     if off.any():
         raise ValueError(f"direction {unit[off][0].tolist()}: need (cos, sin) of an angle, of length 1")
-    return _describe(whole.reshape(-1), whole.shape[1], at, unit, PAIRS)
+    if pairs.ndim != 2 or pairs.shape[1] != 4 or len(pairs) % 8:
+        raise ValueError(f"pairs {pairs.shape}: need (8 b, 4), whole bytes of comparisons")
+    if (np.hypot(pairs[:, ::2], pairs[:, 1::2]) > BORDER).any():
+        raise ValueError(f"a pair has a pixel more than {BORDER} from the centre")
+    return _describe(whole.reshape(-1), whole.shape[1], at, unit, pairs)
 
 
 @accelerated("orb:describe")
