@@ -66,7 +66,7 @@ def build(rng: np.random.Generator) -> Topic:
     exact = tolerance(1e-15, "whole numbers", float32=1e-6)
     for flag, count in (("", 4), ("no_loops", 2)):
         cases = [_graph(rng, flag) for _ in range(count)]
-        topic.group("loops.essential_edges", "eq-essential", "sets of pairs", exact, cases, flags=flag)
+        topic.group("loops.essential_edges", "eq-essential-graph", "sets of pairs", exact, cases, flags=flag)
     return topic
 
 
