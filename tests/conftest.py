@@ -23,9 +23,21 @@ from types import ModuleType
 import hypothesis
 import pytest
 
+from vslam_ref import _kernels
+
 hypothesis.settings.register_profile("repeatable", deadline=None, database=None, derandomize=True)
 hypothesis.settings.register_profile("fresh", deadline=None, database=None, max_examples=1000)
 hypothesis.settings.load_profile("repeatable")
+
+
+@pytest.fixture(params=["numpy", "numba"])
+def backend(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Run a test with both backends."""
+    if request.param == "numba":
+        pytest.importorskip("numba", reason="the twins need numba (extra `fast`)")
+    with _kernels.use_backend(request.param):
+        yield request.param
+
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SOLUTIONS = DOCS / "chapters" / "solutions"

@@ -21,6 +21,7 @@ import numpy as np
 import pose_graph_samples
 import scipy.io
 import vocabulary_samples
+from camera_samples import OST, RAW
 from sequence_samples import CALIB, LAYOUTS, SIZE
 
 from vslam_ref.datasets.bundle_files import BundleFile
@@ -386,28 +387,6 @@ class _Log(NamedTuple):
 
 _MRCLAM_LOG = _Log(100.0, np.array([0.0, 1.5]), np.zeros((2, 2)))
 _PARK_LOG = _Log(0.0, _TIME / 1e3, np.stack([np.ones(len(_TIME)), np.zeros(len(_TIME))], -1))
-
-RAW = """calib_time: 09-Jan-2012 13:57:47
-S_00: 1392 512
-K_00: 984.25 0 690 0 980.75 233.25 0 0 1
-D_00: -0.37 0.2 0.002 0.001 -0.07
-S_rect_00: 1242 375
-P_rect_00: 721.5 0 609.5 0 0 721.5 172.75 0 0 0 1 0
-"""
-OST = """# oST version 5.0 parameters
-[image]
-width
-752
-height
-480
-[narrow_stereo]
-camera matrix
-458.5 0.000000 367.25
-0.000000 457.25 248.5
-0.000000 0.000000 1.000000
-distortion
--0.28 0.07 0.0002 0.00002 0.015
-"""
 
 _BAL = bundle_samples.bal_text()
 _BUNDLER = bundle_samples.bundler_text()

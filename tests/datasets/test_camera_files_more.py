@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from camera_samples import OST, RAW
 
 from vslam_ref.datasets.sequences import read_camera
 from vslam_ref.datasets.text import FormatError
@@ -50,49 +51,6 @@ projection_parameters:
 """
 MEI = PINHOLE.replace("PINHOLE", "MEI").replace("distortion_p", "mirror_parameters:\n   xi: 0\ndistortion_p")
 MEI = MEI.replace("fx:", "gamma1:").replace("fy:", "gamma2:").replace("cx:", "u0:").replace("cy:", "v0:")
-RAW = """calib_time: 09-Jan-2012 13:57:47
-corner_dist: 9.95e-02
-S_00: 1392 512
-K_00: 984.25 0 690 0 980.75 233.25 0 0 1
-D_00: -0.37 0.2 0.002 0.001 -0.07
-R_00: 1 0 0 0 1 0 0 0 1
-T_00: 0 0 0
-S_rect_00: 1242 375
-R_rect_00: 1 0 0 0 1 0 0 0 1
-P_rect_00: 721.5 0 609.5 0 0 721.5 172.75 0 0 0 1 0
-S_01: 1392 512
-"""
-OST = """# oST version 5.0 parameters
-
-
-[image]
-
-width
-752
-
-height
-480
-
-[narrow_stereo]
-
-camera matrix
-458.5 0.000000 367.25
-0.000000 457.25 248.5
-0.000000 0.000000 1.000000
-
-distortion
--0.28 0.07 0.0002 0.00002 0.015
-
-rectification
-1.000000 0.000000 0.000000
-0.000000 1.000000 0.000000
-0.000000 0.000000 1.000000
-
-projection
-400.0 0.000000 367.25 0.000000
-0.000000 400.0 248.5 0.000000
-0.000000 0.000000 1.000000 0.000000
-"""
 CHAIN = "".join(
     f"""cam{k}:
   camera_model: pinhole

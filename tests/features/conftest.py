@@ -6,19 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vslam_ref import _kernels
 from vslam_ref.worlds.pictures import painted_wall, picture
 
 Bytes = NDArray[np.uint8]
-
-
-@pytest.fixture(params=["numpy", "numba"])
-def backend(request: pytest.FixtureRequest) -> object:
-    """Run a test with both backends."""
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    with _kernels.use_backend(request.param):
-        yield request.param
 
 
 @pytest.fixture(scope="session")

@@ -102,6 +102,22 @@ def words(rows: Bytes) -> Words:
     return wide.view(np.uint64)
 
 
+def differing(a: Bytes, b: Bytes) -> IntArray:
+    """Count the bits (...) in which descriptors ``a (..., bytes)`` differ from ``b (..., bytes)``, in pairs.
+
+    Implements :eq:`eq-hamming`; counts have no unit.
+
+    Examples
+    --------
+    >>> differing(np.array([[0b1100], [0b1]], np.uint8), np.array([[0b1010], [0b1]], np.uint8))
+    array([2, 0])
+    """
+    apart = np.asarray(a ^ b)
+    each = bit_count(words(apart.reshape(-1, apart.shape[-1])))  # eq-hamming
+    bits: IntArray = each.sum(-1, dtype=np.int64)
+    return bits.reshape(apart.shape[:-1])
+
+
 def bit_count(word: Words) -> Bytes:
     """Count the bits that are set in each word (...); below NumPy 2, by a table of 16 bits.
 

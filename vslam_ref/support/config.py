@@ -11,7 +11,7 @@ import dataclasses
 import math
 import types
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, Literal, NamedTuple, TypeVar, Union
 
 from vslam_ref.support.errors import InputError, suggestion
@@ -57,6 +57,23 @@ def settings(config: Any, prefix: str = "") -> Iterator[Setting]:
             yield Setting(
                 prefix + field.name, hints[field.name], value, about.get("reason", ""), about.get("unit", "")
             )
+
+
+def refuse_small(config: Any, at_least_one: Collection[str]) -> None:
+    """Refuse numbers of a config that are not finite, negative, or below 1 where one is needed.
+
+    Raises
+    ------
+    ValueError
+        With the first such setting's dotted key; booleans and words are no numbers.
+    """
+    for setting in settings(config):
+        for number in setting.value if isinstance(setting.value, tuple) else (setting.value,):
+            if isinstance(number, bool | str):
+                continue
+            least = 1 if setting.key in at_least_one else 0
+            if not (math.isfinite(number) and number >= least):
+                raise ValueError(f"{setting.key}={number:g}: need {least} or more")
 
 
 def find_setting(config: Any, name: str) -> str | None:

@@ -33,6 +33,8 @@ class Matching:
     bins : int
         Of the histogram of turns; a pair must be in one of the ``kept`` fullest.
     kept : int
+    least : float
+        Of these, only bins with so many pairs as this share of the fullest one's.
 
     Raises
     ------
@@ -44,11 +46,14 @@ class Matching:
     limit: int = 100
     bins: int = 30
     kept: int = 3
+    least: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse settings that mean nothing."""
         if not (0.0 < self.ratio <= 1.0 and 0 <= self.limit <= 256 and 1 <= self.kept <= self.bins):
             raise ValueError(f"{self}: need 0 < ratio <= 1, a limit up to 256, and 1 <= kept <= bins")
+        if not 0.0 <= self.least <= 1.0:
+            raise ValueError(f"least={self.least:g}: need a share from 0 to 1")
 
 
 class Matched(NamedTuple):
@@ -111,6 +116,8 @@ def match(
 def turned_alike(angle_a: ArrayLike, angle_b: ArrayLike, settings: Matching | None = None) -> BoolArray:
     """Which pairs turn as most do: those in the fullest bins of a histogram.
 
+    Implements :eq:`eq-turn-histogram`.
+
     Parameters
     ----------
     angle_a, angle_b : array_like, shape (m,)
@@ -133,4 +140,5 @@ def turned_alike(angle_a: ArrayLike, angle_b: ArrayLike, settings: Matching | No
     count = np.bincount(place, minlength=how.bins)
     full = np.zeros(how.bins, np.bool_)
     full[np.argsort(-count, kind="stable")[: how.kept]] = True
+    full &= count >= how.least * count.max()
     return np.asarray(full[place])

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from vslam_ref.arrays import IntArray
+from vslam_ref.features.hamming import differing
 from vslam_ref.geometry import camera_pose
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
 from vslam_ref.systems.visual_map.keyframe_map import Bytes
@@ -53,6 +54,6 @@ def _most_alike(descriptor: Bytes, first: IntArray, count: IntArray) -> IntArray
     for size in np.unique(count):
         groups = np.flatnonzero(count == size)
         d = descriptor[first[groups, None] + np.arange(size)]  # (g, size, 32)
-        apart = np.unpackbits(d[:, :, None] ^ d[:, None], axis=-1).sum(-1, dtype=np.int64)
+        apart = differing(d[:, :, None], d[:, None])
         best[groups] = np.argmin(np.median(apart, axis=2), axis=1)
     return best

@@ -128,17 +128,18 @@ class OrbSlam:
         steps, s = self._steps(), self.settings.start
         if self.chosen is not None:
             return self._towards(self.chosen, picture)
-        why = FIRST
-        if self.matched is not None:
-            went = steps.go_on(self.matched, picture)
-            why = start_steps.worn(went, s)
-            begun = steps.begin(picture)
-            if why and (few := start_steps.too_few(begun, s)) and not start_steps.too_few(self.matched, s):
-                return PictureOutcome(picture.number, waiting=f"passed over: {few}")
-            self.matched = went
+        before, why = self.matched, FIRST
+        if before is not None:
+            self.matched = steps.go_on(before, picture)
+            why = start_steps.worn(self.matched, s)
         if self.matched is None or why:
-            self.matched = steps.begin(picture)
-            return PictureOutcome(picture.number, waiting=start_steps.too_few(self.matched, s) or why)
+            begun = steps.begin(picture)
+            few = start_steps.too_few(begun, s)
+            if few and before is not None and not start_steps.too_few(before, s):
+                self.matched = before
+                return PictureOutcome(picture.number, waiting=f"passed over: {few}")
+            self.matched = begun
+            return PictureOutcome(picture.number, waiting=few or why)
         if waiting := start_steps.too_early(self.matched, s):
             return PictureOutcome(picture.number, waiting=waiting)
         found = steps.attempt(self.matched)

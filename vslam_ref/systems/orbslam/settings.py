@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 from vslam_ref.features.orb import OrbSettings
-from vslam_ref.support.config import assume, settings
+from vslam_ref.support.config import assume, refuse_small
 from vslam_ref.systems.orbslam.loop_settings import LoopSettings
 from vslam_ref.systems.visual_map.refine_camera import CameraSettings
 
@@ -135,12 +134,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing."""
-        for key, _, value, _, _ in settings(self):
-            if isinstance(value, bool | str):
-                continue
-            least = 1 if key in AT_LEAST_ONE else 0
-            if not (math.isfinite(value) and value >= least):
-                raise ValueError(f"{key}={value:g}: need {least} or more")
+        refuse_small(self, AT_LEAST_ONE)
         if self.tracker.local_map not in LOCAL_MAPS:
             raise ValueError(f"tracker.local_map={self.tracker.local_map!r}: need {' or '.join(LOCAL_MAPS)}")
         try:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.features.orb import OrbFeatures
+from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features.vocabulary import Matching, turned_alike
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.geometry.multiview.two_views import essential_consensus
@@ -29,7 +29,7 @@ from vslam_ref.systems.orbslam.window_search import Places, assigned, search_win
 from vslam_ref.systems.visual_map.starting import DRAWS, Between, Pair, judge_start, one_pixel, unit_depth
 from vslam_ref.systems.visual_map.telling import Attempt
 
-BIN = 2 * np.pi / 30
+TURNS = Matching(bins=30, kept=3, least=0.1)
 """Of the histogram of turns: matches whose turn is not among the commonest are wrong."""
 
 
@@ -87,7 +87,7 @@ def go_on(
     feature = assigned(search_windows(places, b), limit=f.near, ratio=s.ratio, room=len(b.uv))
     feature[a.octave >= s.octaves] = -1
     rows = np.flatnonzero(feature >= 0)
-    feature[rows[~same_turn(a, rows, b, feature[rows])]] = -1
+    feature[rows[~turned_alike(a.angle[rows], b.angle[feature[rows]], TURNS)]] = -1
     found = feature >= 0
     now = np.where(found[:, None], b.uv[feature], np.nan) if len(b.uv) else np.full_like(matched.last, np.nan)
     return StartMatches(
@@ -96,19 +96,6 @@ def go_on(
         feature,
         np.where(found[:, None], now, matched.last),
     )
-
-
-def same_turn(a: OrbFeatures, i: IntArray, b: OrbFeatures, j: IntArray) -> BoolArray:
-    """Which matches of features ``i (m,)`` and ``j (m,)`` turned as most did; angles in radians.
-
-    Implements :eq:`eq-turn-histogram`: those in the three fullest of 30 bins.
-    """
-    turn = np.mod(b.angle[j] - a.angle[i], 2 * np.pi)
-    each = np.rint(turn / BIN).astype(np.int64) % 30
-    count = np.bincount(each, minlength=30)
-    fullest = np.argsort(-count, kind="stable")[:3]
-    fullest = fullest[count[fullest] >= 0.1 * count.max(initial=0)]
-    return np.asarray(np.isin(each, fullest))
 
 
 def too_few(matched: StartMatches, s: StartSettings) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
+from vslam_ref.features.hamming import differing
 from vslam_ref.features.orb import OrbFeatures
 from vslam_ref.systems.visual_map.keyframe_map import Bytes
 
@@ -108,7 +109,7 @@ def _search(
     apart = np.abs(uv[:, None] - feature_uv).max(-1, initial=0.0)
     close = (apart <= radius[:, None]) & (octave >= low[:, None]) & (octave <= high[:, None])
     row, column = np.nonzero(close)
-    bits = np.unpackbits(descriptor[row] ^ feature_descriptor[column], axis=1).sum(1, dtype=np.int64)
+    bits = differing(descriptor[row], feature_descriptor[column])
     order = np.lexsort((column, bits, row))
     row, column, bits = row[order], column[order], bits[order]
     rows, first = np.unique(row, return_index=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
-from vslam_ref.support.config import assume, settings
+from vslam_ref.support.config import assume, refuse_small
 from vslam_ref.systems.visual_map import Looks
 from vslam_ref.systems.visual_map.refine_camera import CameraSettings
 
@@ -167,10 +166,4 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing."""
-        for key, _, value, _, _ in settings(self):
-            for number in value if isinstance(value, tuple) else (value,):
-                if isinstance(number, bool | str):
-                    continue
-                least = 1 if key in AT_LEAST_ONE else 0
-                if not (math.isfinite(number) and number >= least):
-                    raise ValueError(f"{key}={number:g}: need {least} or more")
+        refuse_small(self, AT_LEAST_ONE)

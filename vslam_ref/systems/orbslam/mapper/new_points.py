@@ -15,6 +15,7 @@ import numpy as np
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.estimation.triangulation import triangulate
+from vslam_ref.features.hamming import differing
 from vslam_ref.geometry import camera_pose, se3, so3
 from vslam_ref.geometry.multiview import Views
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
@@ -112,7 +113,7 @@ def _search(
     e = line @ bearing.T
     gx, gy = line @ J_pixel[:, :, 0].T, line @ J_pixel[:, :, 1].T
     row, column = np.nonzero(e * e <= (distance * width) ** 2 * (gx * gx + gy * gy))  # eq-curve-distance
-    bits = np.unpackbits(descriptor[row] ^ other[column], axis=1).sum(1, dtype=np.int64)
+    bits = differing(descriptor[row], other[column])
     order = np.lexsort((column, bits, row))
     rows, first = np.unique(row[order], return_index=True)
     best[rows], least[rows] = column[order[first]], bits[order[first]]
