@@ -47,6 +47,13 @@ class Listed(NamedTuple):
     within: dict[str, float]
 
 
+@functools.cache
+def answers(compiler: str) -> bool:
+    """Whether a compiler can say its version: rustup leaves a command that only asks for a toolchain."""
+    found = shutil.which(compiler)
+    return found is not None and subprocess.run([found, "--version"], capture_output=True).returncode == 0
+
+
 def missing(name: str) -> str:
     """Why an adapter cannot be asked here; empty if it can."""
     needs = {"gtsam": "gtsam", "gtsam_usual": "gtsam", "filterpy": "filterpy"}
@@ -58,8 +65,8 @@ def missing(name: str) -> str:
         return "node is not installed"
     if name == "cpp" and compiler() is None:
         return "neither g++ nor clang++ is installed"
-    if name == "rust" and shutil.which("rustc") is None:
-        return "rustc is not installed"
+    if name == "rust" and not answers("rustc"):
+        return "rustc is not installed, or has no toolchain of its user's"
     if name == "octave" and shutil.which("octave-cli") is None:
         return "GNU Octave is not installed"
     return ""
