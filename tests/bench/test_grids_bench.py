@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from vslam_ref.bench import grids
-from vslam_ref.grids import rays
+from vslam_ref.grids import beam_marks
 
 
 def test_bresenham_is_the_line_and_its_cells_are_near_the_beams() -> None:
@@ -28,11 +28,11 @@ def test_bresenham_is_the_line_and_its_cells_are_near_the_beams() -> None:
 def test_peer_and_library_see_the_same_room() -> None:
     angles, ranges = grids.room()
     theirs = grids.peer((ranges * np.cos(angles)).tolist(), (ranges * np.sin(angles)).tolist())
-    window = rays.mark_beams((grids.CELLS, grids.CELLS), grids.scan_in_cells())
+    window = beam_marks.mark_beams((grids.CELLS, grids.CELLS), grids.scan_in_cells())
     free = theirs.T == 0.0  # theirs has x first
-    ours = window == rays.MISS
+    ours = window == beam_marks.MISS
     # theirs moves ends by half a cell and leaves the line by half a cell: every cell of theirs is a neighbour
     # of ours, and ours, which has every cell that is cut, has more
-    near = binary_dilation(window != rays.UNSEEN, np.ones((3, 3)))
+    near = binary_dilation(window != beam_marks.UNSEEN, np.ones((3, 3)))
     assert not (free & ~near).any()
     assert 1.0 < ours.sum() / free.sum() < 1.6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vslam_ref.estimation.calibration import Board, BoardView, calibrate, doubts, picture_uncertainty, stack
-from vslam_ref.estimation.calibration.weakness import directions
+from vslam_ref.estimation.calibration.board_directions import directions
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole, Radtan
 from vslam_ref.worlds import boards

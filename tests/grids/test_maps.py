@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from vslam_ref import _kernels
-from vslam_ref.grids import AS_PRINTED, MapConfig, PlainMap, Scan, StaticDynamicMap, rays, static_dynamic
+from vslam_ref.grids import (
+    AS_PRINTED,
+    MapConfig,
+    PlainMap,
+    Scan,
+    StaticDynamicMap,
+    beam_marks,
+    rays,
+    static_dynamic,
+)
 from vslam_ref.grids.log_odds import FREE, OCCUPIED, UNKNOWN, states
 from vslam_ref.grids.scan import BeamCounts, LaserScanner
 
@@ -59,7 +68,7 @@ class Slow:
                 if not near or cell not in observed:
                     observed[cell] = "graze" if near else "miss"
             if is_hit:
-                x, y = rays.end_cells(end[None])[0].tolist()
+                x, y = beam_marks.end_cells(end[None])[0].tolist()
                 hits.append((y, x))
         observed |= dict.fromkeys(hits, "hit")
         before = {cell: self.state(cell) for cell in self.cells}

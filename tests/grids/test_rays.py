@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vslam_ref import _kernels
-from vslam_ref.grids import log_odds, rays
+from vslam_ref.grids import beam_marks, log_odds, rays
 from vslam_ref.grids.plain import apply_plain
 
 BACKENDS = ["numpy", "numba"]
@@ -122,11 +122,11 @@ def test_length_of_the_beam_is_the_sum_over_its_cells() -> None:
     np.testing.assert_allclose(np.bincount(found.beam, last - first), 1.0, atol=1e-9)
 
 
-def beams(rng: np.random.Generator, n: int) -> rays.BeamsInCells:
+def beams(rng: np.random.Generator, n: int) -> beam_marks.BeamsInCells:
     start = np.round(rng.uniform(18, 22, 2) * 2) / 2
     ends = rng.uniform(3, 37, (n, 2))
     ends[::3] = np.round(ends[::3] * 2) / 2
-    return rays.BeamsInCells(start, ends, rng.random(n) < 0.6)
+    return beam_marks.BeamsInCells(start, ends, rng.random(n) < 0.6)
 
 
 @pytest.mark.parametrize("graze", [0, 1, 3, 50])
@@ -135,9 +135,9 @@ def test_marks_are_the_crossed_cells_and_hits_win(
     seed: int, graze: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Grazed are the cells within ``graze`` of the last crossed one, along the beam's longer axis."""
-    monkeypatch.setattr(rays, "GROUP", 7 if seed % 2 else rays.GROUP)  # more than one group
+    monkeypatch.setattr(beam_marks, "GROUP", 7 if seed % 2 else beam_marks.GROUP)  # more than one group
     start, ends, hit = beams(np.random.default_rng(seed), 150)
-    window = rays.mark_beams((40, 40), rays.BeamsInCells(start, ends, hit), graze)
+    window = beam_marks.mark_beams((40, 40), beam_marks.BeamsInCells(start, ends, hit), graze)
     expected = np.zeros((40, 40), np.uint8)
     for e, h in zip(ends, hit, strict=True):
         quantised = tuple(Fraction(int(np.rint(v * rays.QUANTA)), rays.QUANTA) for v in e)
@@ -147,9 +147,9 @@ def test_marks_are_the_crossed_cells_and_hits_win(
         last = (max if d[axis] >= 0 else min)((c[1 - axis] for c in crossed), default=0)
         for cell in crossed:
             near = h and graze > 0 and abs(cell[1 - axis] - last) <= graze
-            expected[cell] = max(expected[cell], rays.GRAZE if near else rays.MISS)
-    for x, y in rays.end_cells(ends[hit]).tolist():
-        expected[y, x] = rays.HIT
+            expected[cell] = max(expected[cell], beam_marks.GRAZE if near else beam_marks.MISS)
+    for x, y in beam_marks.end_cells(ends[hit]).tolist():
+        expected[y, x] = beam_marks.HIT
     np.testing.assert_array_equal(window, expected)
 
 
@@ -159,7 +159,7 @@ def test_a_beam_within_its_first_column_beside_a_long_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start = np.rint(rng.uniform(18, 22, 2) * rays.QUANTA) / rays.QUANTA
     ends = np.rint(np.stack([start + rng.uniform(-0.9, 0.9, 2), [33.0, 4.0]]) * rays.QUANTA) / rays.QUANTA
-    window = rays.mark_beams((40, 40), rays.BeamsInCells(start, ends, np.zeros(2, dtype=bool)))
+    window = beam_marks.mark_beams((40, 40), beam_marks.BeamsInCells(start, ends, np.zeros(2, dtype=bool)))
     crossed = [exact_cells(tuple(map(Fraction, start)), tuple(map(Fraction, e))) for e in ends]
     assert {tuple(c) for c in np.argwhere(window).tolist()} == crossed[0] | crossed[1]
 
@@ -171,10 +171,10 @@ def test_both_backends_visit_the_exact_cells(seed: int, backend: str) -> None:
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     seen = beams(np.random.default_rng(seed), 70)
-    window = rays.mark_beams((40, 40), seen)
+    window = beam_marks.mark_beams((40, 40), seen)
     picture = np.zeros(1600)
     with _kernels.use_backend(backend):
-        apply_plain(picture, 40, seen, np.array([rays.MISS, rays.HIT], float), 9.0)
+        apply_plain(picture, 40, seen, np.array([beam_marks.MISS, beam_marks.HIT], float), 9.0)
     np.testing.assert_array_equal(picture.reshape(40, 40), window)
 
 
@@ -184,7 +184,7 @@ def test_beams_that_cannot_be_walked_are_refused(backend: str, bad: float) -> No
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     picture = np.zeros(100)
-    seen = rays.BeamsInCells(np.full(2, 5.0), np.array([[bad, 5.0]]), np.ones(1, bool))
+    seen = beam_marks.BeamsInCells(np.full(2, 5.0), np.array([[bad, 5.0]]), np.ones(1, bool))
     with _kernels.use_backend(backend), pytest.raises(ValueError, match="beam is not finite or spans"):
         apply_plain(picture, 10, seen, np.array([1.0, 2.0]), 9.0)
     assert not picture.any()
@@ -196,7 +196,7 @@ def test_beams_that_leave_the_map_are_refused(backend: str, end: tuple[float, fl
     if backend == "numba":
         pytest.importorskip("numba", reason="the twin needs numba")
     picture = np.zeros(100)
-    seen = rays.BeamsInCells(np.full(2, 5.0), np.array([end]), np.ones(1, bool))
+    seen = beam_marks.BeamsInCells(np.full(2, 5.0), np.array([end]), np.ones(1, bool))
     with _kernels.use_backend(backend), pytest.raises(ValueError, match="a beam leaves the map"):
         apply_plain(picture, 10, seen, np.array([1.0, 2.0]), 9.0)
     assert not picture.any()

@@ -24,7 +24,7 @@ import vslam_ref
 from vslam_ref import _kernels
 from vslam_ref.filters.block_covariance import State
 from vslam_ref.filters.vehicle import Increment
-from vslam_ref.grids.rays import BeamsInCells
+from vslam_ref.grids.beam_marks import BeamsInCells
 from vslam_ref.grids.static_dynamic import Layers, Rules
 
 from . import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from vslam_ref.estimation import third_picture
+from vslam_ref.estimation import three_views
 from vslam_ref.estimation.third_picture import ask_third, refine_three
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.multiview import two_views
@@ -159,8 +159,8 @@ def test_from_infinity_a_point_comes_nearer_and_goes_no_farther(
 ) -> None:
     """One point whose error grows by one for each unit of inverse depth: Newton's step is minus the error."""
     along = np.array([[1.0, 0.0, 0.0, 0.0]])
-    now = third_picture._Linear(error * along, np.zeros((1, 4, 11)), along, np.ones(1))
-    step = third_picture._step(now, np.ones(1), np.array([w]), 1e-3)
+    now = three_views._Linear(error * along, np.zeros((1, 4, 11)), along, np.ones(1))
+    step = three_views._step(now, np.ones(1), np.array([w]), 1e-3)
     assert step.inverse_depth[0] == pytest.approx(wanted, abs=1e-12)
 
 

@@ -27,9 +27,9 @@ from vslam_ref.arrays import Array
 from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.datasets import carmen, catalogue
 from vslam_ref.grids import MapConfig, StaticDynamicMap, static_dynamic
+from vslam_ref.grids.beam_marks import BeamsInCells
 from vslam_ref.grids.log_odds import log_odds
 from vslam_ref.grids.plain import apply_plain
-from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.support.timing import paired
 
 BEAMS, CELLS, RESOLUTION, HALF = 360, 400, 0.1, 19.5

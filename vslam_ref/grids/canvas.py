@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array
+from vslam_ref.grids.beam_marks import BeamsInCells
 from vslam_ref.grids.lattice import Lattice
-from vslam_ref.grids.rays import BeamsInCells
 from vslam_ref.grids.scan import BeamCounts, ScanLike, ScanReport, sort_beams, unit_vectors
 
 

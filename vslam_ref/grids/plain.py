@@ -12,10 +12,10 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array
+from vslam_ref.grids.beam_marks import HIT, MISS, BeamsInCells, look
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import LogOddsGrid, log_odds
 from vslam_ref.grids.map_config import MapConfig
-from vslam_ref.grids.rays import HIT, MISS, BeamsInCells, look
 
 
 class PlainMap(Canvas):
@@ -65,7 +65,7 @@ def apply_plain(log_odds: Array, columns: int, beams: BeamsInCells, evidence: Ar
     Raises
     ------
     ValueError
-        As :func:`vslam_ref.grids.rays.look`; nothing is changed then.
+        As :func:`vslam_ref.grids.beam_marks.look`; nothing is changed then.
 
     Notes
     -----

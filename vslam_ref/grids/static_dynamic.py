@@ -36,7 +36,7 @@ import numpy as np
 
 from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.grids import rays
+from vslam_ref.grids import beam_marks
 from vslam_ref.grids.canvas import Canvas
 from vslam_ref.grids.log_odds import DECIDED_LOG_ODDS, FREE, OCCUPIED, UNKNOWN, LogOddsGrid, log_odds, states
 from vslam_ref.grids.map_config import MapConfig
@@ -44,7 +44,7 @@ from vslam_ref.grids.map_config import MapConfig
 EIGHT = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
 """Directions to the neighbours of a cell."""
 KIND = np.array([-1, 2, 0, 1])
-"""Column of the table for :data:`~vslam_ref.grids.rays.GRAZE`, ``MISS`` and ``HIT``."""
+"""Column of the table for :data:`~vslam_ref.grids.beam_marks.GRAZE`, ``MISS`` and ``HIT``."""
 
 
 class Layers(NamedTuple):
@@ -144,7 +144,7 @@ class StaticDynamicMap(Canvas):
         super().__init__(c.resolution, c.usable_range, c.no_return, fills._asdict())
         self._rules = rules_of(c)
 
-    def _draw(self, beams: rays.BeamsInCells) -> None:
+    def _draw(self, beams: beam_marks.BeamsInCells) -> None:
         flat = Layers(*(layer.reshape(-1) for layer in self.layers.values()))
         apply_scan(flat, self.lattice.shape[1], beams, self._rules, self.time)
 
@@ -167,7 +167,9 @@ class StaticDynamicMap(Canvas):
 
 
 @accelerated("grids:apply_scan")
-def apply_scan(layers: Layers, columns: int, beams: rays.BeamsInCells, rules: Rules, now: float) -> None:
+def apply_scan(
+    layers: Layers, columns: int, beams: beam_marks.BeamsInCells, rules: Rules, now: float
+) -> None:
     """Change S and D, in place, by one scan.
 
     Implements :eq:`eq-static-recursion` (A§4.2), :eq:`eq-dynamic-recursion` (A§4.3) and
@@ -188,14 +190,14 @@ def apply_scan(layers: Layers, columns: int, beams: rays.BeamsInCells, rules: Ru
     Raises
     ------
     ValueError
-        As :func:`vslam_ref.grids.rays.look`; nothing is changed then.
+        As :func:`vslam_ref.grids.beam_marks.look`; nothing is changed then.
     """
     rows = len(layers.static) // columns
-    row, column, what = rays.looked_at((rows, columns), beams, rules.graze)
+    row, column, what = beam_marks.looked_at((rows, columns), beams, rules.graze)
     at = row * columns + column
     S, D, seen, last_hit, since = (layer[at] for layer in layers)
     state = states(S)  # S_{t-1} chooses the row of the table
-    hits = np.flatnonzero(what == rays.HIT)
+    hits = np.flatnonzero(what == beam_marks.HIT)
     around = layers.static.reshape(rows, columns), row[hits], column[hits]
 
     unseen = np.where(now - seen > rules.hit_gap, now - seen, 0.0)  # when nobody looked, nothing stayed

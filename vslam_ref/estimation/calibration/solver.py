@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.estimation.calibration.board import BoardCorners, stack
+from vslam_ref.estimation.calibration.board_directions import regular_point
 from vslam_ref.estimation.calibration.parameters import Free
 from vslam_ref.estimation.calibration.problem import CalibrationIterate, CalibrationProblem
 from vslam_ref.estimation.calibration.result import Calibration, Certainty, certainty
 from vslam_ref.estimation.calibration.start import Start, find_start, state_of
-from vslam_ref.estimation.calibration.weakness import counts_as_one, regular_point, sensor_causes
+from vslam_ref.estimation.calibration.weakness import counts_as_one, sensor_causes
 from vslam_ref.estimation.least_squares import Descent, Options, descend
 from vslam_ref.estimation.least_squares.result import CONVERGED
 from vslam_ref.estimation.robust import L2, Loss

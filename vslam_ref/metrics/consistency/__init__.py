@@ -42,12 +42,14 @@ from vslam_ref.metrics.consistency.bootstrap import (
 )
 from vslam_ref.metrics.consistency.nees import (
     NormalisedSquare,
-    heading_vector_error,
     nees,
-    nees_pose,
-    nees_se2,
     nees_singular,
     nis,
+)
+from vslam_ref.metrics.consistency.pose_nees import (
+    heading_vector_error,
+    nees_pose,
+    nees_se2,
     pose_error,
 )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.adapters.table import Answers
-from vslam_ref.grids import inverse_sensor, log_odds, map_config, rays, recursion, static_dynamic
+from vslam_ref.grids import beam_marks, inverse_sensor, log_odds, map_config, rays, recursion, static_dynamic
 
 SIDE = 7
 """Cells of a map's side: a beam must stay a cell away from the border."""
@@ -71,7 +71,7 @@ def _config(
 
 def _look(layers: Array, now: float, observation: str, config: map_config.MapConfig) -> None:
     end = [[3.5, 3.5]] if observation == "hit" else [[4.5, 3.5]]
-    beam = rays.BeamsInCells(np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"]))
+    beam = beam_marks.BeamsInCells(np.array([2.5, 3.5]), np.array(end), np.array([observation == "hit"]))
     rules = static_dynamic.rules_of(config)
     static_dynamic.apply_scan(static_dynamic.Layers(*layers), SIDE, beam, rules, now)
 
