@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from vslam_ref.support.config import assume, settings
+from vslam_ref.support.config import assume, refuse_small
+
+COUNTS = (
+    "consistent", "draws", "least_matches", "least_inliers", "least_points", "group", "theta_min", "steps",
+)  # fmt: skip
+"""Fewer than one of these is none at all."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +43,6 @@ class LoopSettings:
 
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing."""
-        for key, _, value, _, _ in settings(self):
-            if isinstance(value, bool):
-                continue
-            least = 0 if key in ("apart", "last_steps", "fuse_radius") else 1e-9
-            if not (math.isfinite(value) and value >= least):
-                raise ValueError(
-                    f"{key}={value:g}: need a number of {'0 or more' if least == 0 else 'above 0'}"
-                )
+        refuse_small(self, COUNTS)
         if self.ratio > 1:
             raise ValueError(f"ratio={self.ratio:g}: need a share up to 1")

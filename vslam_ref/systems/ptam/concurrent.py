@@ -31,7 +31,7 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import se3
 from vslam_ref.support.stopwatch import Stopwatch
 from vslam_ref.systems.ptam.mapper.mapper import MappedKeyframe, map_keyframe
-from vslam_ref.systems.ptam.ptam import PictureOutcome, Pose, Ptam
+from vslam_ref.systems.ptam.ptam import PictureOutcome, Ptam
 from vslam_ref.systems.ptam.settings import Settings
 from vslam_ref.systems.ptam.tracker.quality import Quality
 from vslam_ref.systems.ptam.tracker.recover import Known
@@ -190,16 +190,16 @@ class ConcurrentPtam(Ptam):
         self.shown, _ = self.mapper.collect()
         self._count_anew(self.shown)
 
-    def _with_the_map(self, picture: PreparedPicture) -> PictureOutcome:
+    def _with_the_map(self, known: VisualMap, picture: PreparedPicture) -> PictureOutcome:
         assert self.tracker is not None
         assert self.mapper is not None
         self.tracked_so_far += 1
         shown = self._look_at_the_newest_map(self.mapper)
-        tracked = self.tracker.track(shown, picture)
+        tracked, kf = self._track(self.tracker, shown, picture)
         if tracked.quality is Quality.LOST:
             return PictureOutcome(picture.number, tracked)
         self._count(self.tried, self.found, tracked)
-        self._note(shown, picture, tracked, live=True)
+        self._note(shown, picture, tracked, kf, live=True)
         queued = self.policy.wants(shown, tracked) and len(self.handed_at) < self.settings.mapper.queue
         if queued:
             self._hand(self.mapper, shown, picture, tracked)
@@ -220,10 +220,8 @@ class ConcurrentPtam(Ptam):
         return shown
 
     def _finished(self, done: FinishedKeyframe) -> None:
-        """A picture is its own reference now."""
         self.handed_at.popleft()
-        live = self.poses[done.number].live
-        self.poses[done.number] = Pose(done.number, done.keyframe.kf, np.eye(4), live)
+        self._is_keyframe(done.number, done.keyframe.kf)
         self.mapping_stages[done.number] = done.stages
 
     def _carry_over(self, before: VisualMap, now: VisualMap) -> None:
