@@ -69,8 +69,8 @@ def vehicle_at(times: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> vehicle_at([0.0, 79.6]).round(9).tolist()
-    [[0.0, -10.0, 0.0], [0.0, -10.0, 0.0]]
+    >>> vehicle_at([0.0, 79.6]).round(3).tolist()
+    [[-0.032, -10.0, 0.0], [-0.032, -10.0, 0.0]]
     """
     poses, increments = _lap()
     s = np.asarray(times, np.float64) * RATE
