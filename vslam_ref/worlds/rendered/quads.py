@@ -65,7 +65,7 @@ def joined(parts: Sequence[Quads]) -> Quads:
 
 
 def taken(quads: Quads, rows: IntArray) -> Quads:
-    """Some of the quads, by their rows (n,)."""
+    """Some of the quads, in metres as all are, by their rows (n,)."""
     return Quads(quads.corner[rows], quads.side[rows], quads.texture[rows], quads.light[rows])
 
 

@@ -99,7 +99,9 @@ class PlacedQuads(NamedTuple):
 
 
 def in_view(quads: Quads, T_cam_world: Array, span: tuple[Array, ...]) -> IntArray:
-    """Numbers of the quads that are not all behind the camera, or all beside the rays of ``span``.
+    """Numbers of the quads that are not all behind the camera, or all beside the rays.
+
+    ``T_cam_world`` (4, 4), metres; ``span`` is that of :class:`RayTable`, four arrays (W,), (W,), (H,), (H,).
 
     Rays have x >= x_min z: a quad whose four corners have x < x_min z meets none, as it is convex.  A margin
     of 1e-9 is far above what rounding does to metres.
