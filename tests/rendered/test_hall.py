@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vslam_ref.worlds.rendered import Effects, RenderedScene, hall, scene
+from vslam_ref.worlds.rendered import Effects, RenderedScene, hall, motion, people, scene
 
 FOCAL, CENTRE = 525.0, np.array([319.5, 239.5])
 SAMPLED = (0, 245, 300, 450, 1100, 1926, 2120, 2386)
@@ -118,10 +118,9 @@ def test_grey_values_are_those_of_the_ray_caster(right: RenderedScene, k: int) -
             continue  # a border: its rays are checked by the depth
         middle = around[12]
         image = texture(right, int(right.quads.texture[middle.quad]))
-        step = np.abs(np.array([around[17].share, around[13].share]) - middle.share)
-        texels = step * image.shape[::-1]
+        J = (np.array([around[17].share, around[13].share]) - middle.share) * image.shape[::-1]
         grey, drawn = point_grey(right, middle), light[pixel[1], pixel[0]]
-        if np.linalg.norm(texels) < 0.98:  # the Frobenius norm bounds the larger side
+        if np.linalg.norm(J, 2) < 0.97:  # differences over a pixel are derivatives to 3 %
             fine.append(drawn - grey)
             continue
         inside = pixel + rng.uniform(-3, 3, (60, 2))
@@ -133,6 +132,19 @@ def test_grey_values_are_those_of_the_ray_caster(right: RenderedScene, k: int) -
     if fine:
         assert np.abs(fine).max() < 1e-6
     assert abs(np.mean(spread)) < 5 * np.std(spread) / np.sqrt(len(spread)) + 0.5
+
+
+def test_near_a_wall_grey_values_are_those_of_the_finest_level(right: RenderedScene) -> None:
+    """From 1.9 m a pixel is half a texel wide, so one bilinear look-up is all; some ten operations on 255."""
+    pose = motion.looking([1.9, -12.1, 1.4], [1.8, -14.0, 1.5])
+    made = replace(right, path=lambda t: np.broadcast_to(pose, (*t.shape, 4, 4)), times=right.times[:1])
+    light, uv, checked = made.light(0), some_pixels(7, 300), 0
+    met = [cast(made, 0, pixel + [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]) for pixel in uv]
+    for (u, v), around in zip(uv, met, strict=True):
+        if len({m.quad for m in around}) == 1 and around[0].depth < 3.0:
+            assert light[v, u] == pytest.approx(point_grey(made, around[0]), abs=1e-6)
+            checked += 1
+    assert checked > 150
 
 
 @pytest.mark.parametrize("k", [100, 1400])
@@ -265,6 +277,28 @@ def test_passers_by_change_what_they_hide_only(right: RenderedScene, busy: Rende
     np.testing.assert_array_equal(plain[~near], with_people[~near])
     assert (plain[moving] != with_people[moving]).mean() > 0.8
     assert not right.moving(1400).any()
+
+
+def test_people_walk_along_their_lanes(busy: RenderedScene) -> None:
+    """At 12 times: where the middle of the quads is, how fast it moves, and that it moves ahead."""
+    people_there, _ = people.walkers(np.random.default_rng(5), 12, 0)
+    for t, walker in zip(np.linspace(0.0, 70.0, 12), people_there, strict=True):
+        x, y, theta = people.place(walker, float(t))
+        later = people.place(walker, float(t) + 1e-3)
+        assert max(abs(x), abs(y)) == pytest.approx(walker.lane, abs=1e-9)
+        way = (later[:2] - [x, y]) / 1e-3
+        if later[2] == theta:  # no corner between
+            ahead = np.array([np.cos(theta), np.sin(theta)])
+            np.testing.assert_allclose(way, abs(walker.speed) * ahead, atol=1e-9)
+        quads = people.crowd([walker])(float(t))
+        corners = np.concatenate([quads.corner, quads.corner + quads.side.sum(1)])
+        np.testing.assert_allclose((corners.min(0) + corners.max(0))[:2] / 2, [x, y], atol=1e-9)
+        assert corners[:, 2].min() == 0.0
+        assert corners[:, 2].max() == pytest.approx(1.76)
+    assert busy.movers is not None
+    for mine, theirs in zip(busy.things(3.5), busy.movers(3.5), strict=True):
+        np.testing.assert_array_equal(mine[-len(theirs) :], theirs)
+        assert len(theirs) == 15 * PEOPLE
 
 
 def test_a_covered_lens_shows_nothing_and_the_rest_stays(right: RenderedScene) -> None:

@@ -180,7 +180,9 @@ def test_a_point_behind_a_thing_is_hidden(made: dict[str, RenderedScene]) -> Non
     assert s.tracks(before).visible[0].all()
 
 
-@pytest.mark.parametrize(("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole")])
+@pytest.mark.parametrize(
+    ("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole"), ("hall", "pinhole")]
+)
 def test_corners_stay_where_their_points_are_projected(
     made: dict[str, RenderedScene], name: str, lens: str
 ) -> None:
