@@ -103,8 +103,7 @@ def in_view(quads: Quads, T_cam_world: Array, span: tuple[Array, ...]) -> IntArr
 
     ``T_cam_world`` (4, 4), metres; ``span`` is that of :class:`RayTable`, four arrays (W,), (W,), (H,), (H,).
 
-    Rays have x >= x_min z: a quad whose four corners have x < x_min z meets none, as it is convex.  A margin
-    of 1e-9 is far above what rounding does to metres.
+    Rays have x >= x_min z: a quad whose corners have x < x_min z meets none.  1e-9 is far above rounding.
     """
     low_x, high_x, low_y, high_y = span
     rays = ((0, low_x.min(), 1), (0, high_x.max(), -1), (1, low_y.min(), 1), (1, high_y.max(), -1))
