@@ -8,7 +8,7 @@ import pytest
 from vslam_ref.geometry import se3, so3
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole, pixel_grid
 from vslam_ref.worlds.rendered import motion, raster, textures
-from vslam_ref.worlds.rendered.quads import Quads, box, joined, quad
+from vslam_ref.worlds.rendered.quads import Quads, box, joined, quad, taken
 
 SIZE = (96, 72)
 CAMERAS: dict[str, Camera] = {
@@ -118,6 +118,23 @@ def test_culling_changes_nothing(camera: Camera) -> None:
             np.testing.assert_array_equal(a, b)
         boxes = (at.box[:, 1] - at.box[:, 0]) * (at.box[:, 3] - at.box[:, 2])
         assert boxes.sum() < 0.6 * 30 * SIZE[0] * SIZE[1]  # and saves work
+
+
+def test_what_is_left_out_is_seen_by_no_ray(camera: Camera) -> None:
+    """Quads around the camera, of all sizes: with and without those that are not in view."""
+    rng = np.random.default_rng(4)
+    packed, rays = textures.pack([WHITE]), raster.ray_table(camera, SIZE)
+    left_out = 0
+    for _ in range(10):
+        parts = rng.normal(0, 1, (60, 3, 3)) * np.exp(rng.uniform(-2, 1, (60, 1, 1)))
+        things, T = joined([quad(*part, 0) for part in parts]), se3.random(rng)
+        some = raster.in_view(things, T, rays.span)
+        quad_of_all, depth_of_all = raster.nearest(rays.xn, *raster.placed(things, packed, T, rays.span))
+        which, depth = raster.nearest(rays.xn, *raster.placed(taken(things, some), packed, T, rays.span))
+        np.testing.assert_array_equal(np.append(some, -1)[which], quad_of_all)
+        np.testing.assert_array_equal(depth, depth_of_all)
+        left_out += 60 - len(some)
+    assert left_out > 200
 
 
 def test_the_nearest_hides_the_others_whatever_their_order(camera: Camera) -> None:

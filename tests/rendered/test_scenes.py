@@ -17,6 +17,7 @@ from vslam_ref.worlds.rendered import (
     NAMES,
     Effects,
     RenderedScene,
+    hall,
     motion,
     painting,
     pinhole,
@@ -32,7 +33,9 @@ SMALL = (160, 120)
 @pytest.fixture(scope="module")
 def made() -> dict[str, RenderedScene]:
     """Every scene, with small pictures."""
-    return {name: scene(name, size=SMALL) for name in NAMES}
+    made = {name: scene(name, size=SMALL) for name in NAMES if name != "hall-ahead"}
+    ahead = hall.path_ahead(np.random.default_rng(0))
+    return made | {"hall-ahead": replace(made["hall"], name="hall-ahead", path=ahead)}
 
 
 # --- bytes
@@ -177,7 +180,9 @@ def test_a_point_behind_a_thing_is_hidden(made: dict[str, RenderedScene]) -> Non
     assert s.tracks(before).visible[0].all()
 
 
-@pytest.mark.parametrize(("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole")])
+@pytest.mark.parametrize(
+    ("name", "lens"), [("desk", "pinhole"), ("desk", "fov"), ("corridor", "pinhole"), ("hall", "pinhole")]
+)
 def test_corners_stay_where_their_points_are_projected(
     made: dict[str, RenderedScene], name: str, lens: str
 ) -> None:

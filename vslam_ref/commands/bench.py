@@ -19,6 +19,7 @@ SUITES = {
     "grids": "vslam_ref.bench.grids",
     "features": "vslam_ref.bench.features",
     "ptam": "vslam_ref.bench.ptam",
+    "hall": "vslam_ref.bench.hall",
 }
 """Name -> module with ``run(quick) -> dict``; its ``rows``, a list of flat dicts, is printed as a table."""
 

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 SOURCE = """\
 SOURCE is a folder of pictures (plain, KITTI odometry, TUM RGB-D, EuRoC or 7-Scenes layout), a video file, the
-name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building). Where
-no camera lies beside the pictures, give --camera, a file whose kind is seen from its content: OpenCV (YAML,
-XML, JSON), ROS camera_info, ORB-SLAM's settings, Kalibr, EuRoC, KITTI, PTAM, TUM monoVO, or one line
-'fx fy cx cy width height'."""
+name of a data set that VSLAM_REF_DATA finds, or a rendered scene (desk, corridor, rotation, building, hall,
+hall-ahead). Where no camera lies beside the pictures, give --camera, a file whose kind is seen from its
+content: OpenCV (YAML, XML, JSON), ROS camera_info, ORB-SLAM's settings, Kalibr, EuRoC, KITTI, PTAM, TUM
+monoVO, or one line 'fx fy cx cy width height'."""
 NUMBERS = """\
 numbers (also in --json): pictures, those with a pose, lost, relocalised; keyframes, points; ATE of the final
 and the live path after alignment by a similarity (null without truth); scale_drift, the scale that brings the

@@ -130,6 +130,21 @@ def write_together(folder: Path, content: Mapping[str, bytes]) -> None:
 
 
 @contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Yield a path of the same name in a temporary folder; the file takes its place when the block succeeds.
+
+    For writers that look at the name.  If the block raises, ``path`` stays as it was.
+    """
+    temporary = _temporary(path, "tmp")
+    temporary.mkdir()
+    try:
+        yield temporary / path.name
+        os.replace(temporary / path.name, path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+@contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """Yield an empty temporary folder that takes the place of ``path`` when the block succeeds.
 

@@ -12,8 +12,7 @@ from vslam_ref.geometry import so3
 from vslam_ref.worlds.rendered import motion, painting
 from vslam_ref.worlds.rendered.corridor import EYE, WIDTH, add_level, add_wall
 from vslam_ref.worlds.rendered.desk import Builder
-from vslam_ref.worlds.rendered.quads import Quads, joined, quad
-from vslam_ref.worlds.rendered.textures import Bytes
+from vslam_ref.worlds.rendered.quads import Built, Quads, joined, quad
 
 Rng = np.random.Generator
 OUTER = 14.0
@@ -24,7 +23,7 @@ SIDE = OUTER - WIDTH
 SECONDS = 44.0
 
 
-def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
+def build(rng: Rng) -> Built:
     """One corridor, four times, and one poster of its own for each: quads in metres, and textures."""
     b = Builder(rng)
     add_wall(b, [0.0, 0.0, 0.0], [1.0, 0, 0], OUTER, [0, 1.0, 0])
@@ -46,7 +45,7 @@ def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
         side = joined([one, own])
         turned = Quads((side.corner - middle) @ R.T + middle, side.side @ R.T, side.texture, side.light)
         sides.append(turned)
-    return joined(sides), b.images
+    return Built(joined(sides), b.images)
 
 
 def path(rng: Rng) -> motion.Path:

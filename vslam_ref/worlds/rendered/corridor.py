@@ -7,7 +7,7 @@ import numpy as np
 from vslam_ref.arrays import Array
 from vslam_ref.worlds.rendered import motion, painting
 from vslam_ref.worlds.rendered.desk import Builder, Paint
-from vslam_ref.worlds.rendered.quads import Quads, joined, quad
+from vslam_ref.worlds.rendered.quads import Built, joined, quad
 from vslam_ref.worlds.rendered.textures import Bytes
 
 Rng = np.random.Generator
@@ -20,7 +20,7 @@ EYE = 1.5
 """Metres above the floor."""
 
 
-def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
+def build(rng: Rng) -> Built:
     """The corridor runs along x to the bend, then along y: quads in metres, and textures."""
     b = Builder(rng)
     half = WIDTH / 2
@@ -32,7 +32,7 @@ def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
     add_wall(b, [left_end, right_end, 0.0], [1.0, 0, 0], WIDTH, [0, -1.0, 0])
     add_level(b, [-3.0, -half], [FIRST + 3.0, WIDTH])
     add_level(b, [left_end, half], [WIDTH, right_end - half])
-    return joined(b.parts), b.images
+    return Built(joined(b.parts), b.images)
 
 
 def add_wall(b: Builder, start: list[float], along: list[float], length: float, inwards: list[float]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.worlds.rendered import motion, painting
-from vslam_ref.worlds.rendered.quads import Quads, box, joined, quad
+from vslam_ref.worlds.rendered.quads import Built, Quads, box, joined, quad
 from vslam_ref.worlds.rendered.textures import Bytes
 
 Rng = np.random.Generator
@@ -55,7 +55,7 @@ class Builder:
         self.parts.append(quad(corner, x, -y, self.texture(paint, *size)))
 
 
-def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
+def build(rng: Rng) -> Built:
     """The desk and the room around it: quads in metres, and textures."""
     b = Builder(rng)
     grey = float(rng.uniform(130, 165))
@@ -69,7 +69,7 @@ def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
     )
     _room(b)
     _things(b)
-    return joined(b.parts), b.images
+    return Built(joined(b.parts), b.images)
 
 
 def _room(b: Builder) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import so3
@@ -36,6 +36,23 @@ class Quads(NamedTuple):
     light: Array
 
 
+class Built(NamedTuple):
+    """A scene's things.
+
+    Attributes
+    ----------
+    quads : Quads
+    images : list of ndarray of uint8, shapes (H, W)
+        Their textures, grey values.
+    landmarks : ndarray, shape (L, 3)
+        Points that stand out, metres, in the world.
+    """
+
+    quads: Quads
+    images: list[NDArray[np.uint8]]
+    landmarks: Array = np.zeros((0, 3))
+
+
 def quad(corner: ArrayLike, across: ArrayLike, down: ArrayLike, texture: int, light: float = 1.0) -> Quads:
     """One parallelogram: ``corner (3,)``, sides ``across (3,)`` and ``down (3,)`` of its texture, metres."""
     sides = np.stack([np.asarray(across, np.float64), np.asarray(down, np.float64)])
@@ -45,6 +62,11 @@ def quad(corner: ArrayLike, across: ArrayLike, down: ArrayLike, texture: int, li
 def joined(parts: Sequence[Quads]) -> Quads:
     """All parts as one."""
     return Quads(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+
+
+def taken(quads: Quads, rows: IntArray) -> Quads:
+    """Some of the quads, in metres as all are, by their rows (n,)."""
+    return Quads(quads.corner[rows], quads.side[rows], quads.texture[rows], quads.light[rows])
 
 
 def box(

@@ -10,7 +10,8 @@ each quad.
 
 *Culling.*  A quad can only be seen by rays inside the rectangle around its outline in the plane z = 1, cut
 off at ``NEAR``.  There every lens has straight edges, so the rectangle is right with distortion, too; which
-rows and columns of the image have rays in it is looked up in the table of rays.
+rows and columns of the image have rays in it is looked up in the table of rays.  Most quads of a large scene
+lie behind the camera or beside all of its rays, and are left out before that.
 
 *Borders.*  Pixels beside one that sees another quad are the mean of ``FINE`` x ``FINE`` rays.
 """
@@ -26,7 +27,7 @@ from vslam_ref._kernels import accelerated
 from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera, pixel_grid
-from vslam_ref.worlds.rendered.quads import Quads
+from vslam_ref.worlds.rendered.quads import Quads, taken
 from vslam_ref.worlds.rendered.textures import PROBES, Bytes, Textures, footprint, sample
 
 NEAR = 0.01
@@ -35,6 +36,8 @@ FINE = 2
 """Rays along each side of a pixel at a border."""
 BACKGROUND = 96.0
 """Grey value where there is nothing."""
+BLOCK = 8192
+"""Rays that NumPy paints at once."""
 
 
 class RayTable(NamedTuple):
@@ -95,6 +98,27 @@ class PlacedQuads(NamedTuple):
     box: IntArray
 
 
+def in_view(quads: Quads, T_cam_world: Array, span: tuple[Array, ...]) -> IntArray:
+    """Numbers of the quads that are not all behind the camera, or all beside the rays.
+
+    ``T_cam_world`` (4, 4), metres; ``span`` is that of :class:`RayTable`, four arrays (W,), (W,), (H,), (H,).
+
+    Rays have x >= x_min z: a quad whose corners have x < x_min z meets none.  1e-9 is far above rounding.
+    """
+    low_x, high_x, low_y, high_y = span
+    rays = ((0, low_x.min(), 1), (0, high_x.max(), -1), (1, low_y.min(), 1), (1, high_y.max(), -1))
+    points = _outline(se3.act(T_cam_world, quads.corner), quads.side @ se3.rotation(T_cam_world).T)
+    out = (points[..., 2] < NEAR).all(1)
+    for axis, bound, sign in rays:
+        out |= (sign * (points[..., axis] - bound * points[..., 2]) < -1e-9).all(1)
+    return np.flatnonzero(~out)
+
+
+def _outline(corner: Array, side: Array) -> Array:
+    """Corners (Q, 4, 3) of quads, in their order around."""
+    return np.asarray(corner[:, None] + np.stack([0 * side[:, 0], side[:, 0], side.sum(1), side[:, 1]], 1))
+
+
 def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Array, ...]) -> PlacedQuads:
     """Put quads before a camera at ``T_cam_world`` (4, 4), metres; ``span`` is of its :class:`RayTable`."""
     extent = np.ascontiguousarray(textures.extent[quads.texture])
@@ -104,8 +128,7 @@ def placed(quads: Quads, textures: Textures, T_cam_world: Array, span: tuple[Arr
     M = np.stack([side[:, 0] / extent[:, :1], side[:, 1] / extent[:, 1:], corner], -1)
     flat = np.abs(np.linalg.det(M)) < 1e-15  # seen exactly from the edge: nothing
     inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), M))
-    outline = corner[:, None] + np.stack([0 * side[:, 0], side[:, 0], side.sum(1), side[:, 1]], 1)
-    return PlacedQuads(inverse, extent, np.where(flat[:, None], 0, _boxes(outline, span)))
+    return PlacedQuads(inverse, extent, np.where(flat[:, None], 0, _boxes(_outline(corner, side), span)))
 
 
 def _boxes(outline: Array, span: tuple[Array, ...]) -> IntArray:
@@ -210,46 +233,61 @@ def shade(
     """
     grey = np.full(len(xn), BACKGROUND)
     met = np.flatnonzero(quad >= 0)
-    q = quad[met]
-    H, x, y = homography[q], xn[met, 0], xn[met, 1]
+    for first in range(0, len(met), BLOCK):  # what belongs to a block stays in the processor's cache
+        some = met[first : first + BLOCK]
+        q = quad[some]
+        J, a, b = _on_surface(homography[q], xn[some], spread[some])
+        seen = footprint(J)
+        total = np.zeros(len(some))
+        for k in range(PROBES):
+            more = np.flatnonzero(seen.probes > k)
+            shift = (k + 0.5) / seen.probes[more] - 0.5
+            at_a, at_b = a[more] + shift * seen.axis[0, more], b[more] + shift * seen.axis[1, more]
+            which = texture[q[more]]
+            total[more] += sample(Textures(texels, table), which, at_a, at_b, seen.level[more])
+        grey[some] = light[q] * total / seen.probes
+    return grey
+
+
+def _on_surface(H: Array, xn: Array, spread: Array) -> tuple[Array, Array, Array]:
+    """Derivative (2, 2, N) of texels in the pixel, and texels a, b (N,) that rays (N, 2) meet."""
+    x, y = xn[:, 0], xn[:, 1]
     h0, h1, w = (H[:, i, 0] * x + H[:, i, 1] * y + H[:, i, 2] for i in range(3))
     z = 1.0 / w
     a, b = h0 * z, h1 * z
-    # derivative of (a, b) in the ray, then in the pixel
     J_ray = [[(H[:, i, j] - at * H[:, 2, j]) * z for j in (0, 1)] for i, at in ((0, a), (1, b))]
-    S = spread[met]
-    J = np.array([[row[0] * S[:, 0, k] + row[1] * S[:, 1, k] for k in (0, 1)] for row in J_ray])
-    seen = footprint(J)
-    total = np.zeros(len(met))
-    for k in range(PROBES):
-        more = np.flatnonzero(seen.probes > k)
-        shift = (k + 0.5) / seen.probes[more] - 0.5
-        at_a, at_b = a[more] + shift * seen.axis[0, more], b[more] + shift * seen.axis[1, more]
-        which = texture[q[more]]
-        total[more] += sample(Textures(texels, table), which, at_a, at_b, seen.level[more])
-    grey[met] = light[q] * total / seen.probes
-    return grey
+    J = [[row[0] * spread[:, 0, k] + row[1] * spread[:, 1, k] for k in (0, 1)] for row in J_ray]
+    return np.array(J), a, b
 
 
 def render(quads: Quads, textures: Textures, rays: RayTable, T_cam_world: Array) -> Array:
     """Grey values (H, W), 0 to 255 and not rounded, that a camera at ``T_cam_world`` (4, 4), metres, sees."""
-    at = placed(quads, textures, T_cam_world, rays.span)
+    some = taken(quads, in_view(quads, T_cam_world, rays.span))
+    at = placed(some, textures, T_cam_world, rays.span)
     height, width = rays.xn.shape[:2]
     quad, _ = nearest(rays.xn, *at)
-    painted = at.homography, quads.texture, quads.light, textures.texels, textures.table
+    painted = at.homography, some.texture, some.light, textures.texels, textures.table
     xn, spread = rays.xn.reshape(-1, 2), rays.spread.reshape(-1, 2, 2)
-    grey = shade(xn, spread, quad.reshape(-1), *painted)
     border = borders(quad)
+    once = quad.reshape(-1)
+    once[border] = -1  # these are painted below
+    grey = shade(xn, spread, once, *painted)
     row, column = np.repeat(border // width, FINE * FINE), np.repeat(border % width, FINE * FINE)
-    offset = (np.arange(FINE) - (FINE - 1) / 2) / FINE
-    du, dv = np.meshgrid(offset, offset)  # of rays in a pixel, pixels
-    step = spread[border][:, None]
-    finer = xn[border, None] + du.reshape(-1, 1) * step[..., 0] + dv.reshape(-1, 1) * step[..., 1]
-    finer = finer.reshape(-1, 2)
-    first, _ = nearest_of(finer, column, row, *at)
     spreads = np.repeat(spread[border], FINE * FINE, 0)
+    finer = _finer(xn[border], spread[border])
+    first, _ = nearest_of(finer, column, row, *at)
     grey[border] = shade(finer, spreads, first, *painted).reshape(-1, FINE * FINE).mean(1)
     return grey.reshape(height, width)
+
+
+def _finer(xn: Array, spread: Array) -> Array:
+    """Rays (FINE^2 N, 2) inside pixels with rays xn (N, 2) and their derivatives (N, 2, 2)."""
+    offset = (np.arange(FINE) - (FINE - 1) / 2) / FINE  # pixels
+    along_u, along_v = np.ascontiguousarray(spread[..., 0]), np.ascontiguousarray(spread[..., 1])
+    finer = np.empty((len(xn), FINE * FINE, 2))
+    for k, (dv, du) in enumerate(np.stack(np.meshgrid(offset, offset, indexing="ij"), -1).reshape(-1, 2)):
+        finer[:, k] = xn + du * along_u + dv * along_v
+    return finer.reshape(-1, 2)
 
 
 def borders(quad: NDArray[np.int32]) -> IntArray:

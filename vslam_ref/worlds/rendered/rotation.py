@@ -8,8 +8,7 @@ from vslam_ref.arrays import Array
 from vslam_ref.worlds.rendered import motion
 from vslam_ref.worlds.rendered.corridor import add_level, add_wall
 from vslam_ref.worlds.rendered.desk import Builder
-from vslam_ref.worlds.rendered.quads import Quads, joined
-from vslam_ref.worlds.rendered.textures import Bytes
+from vslam_ref.worlds.rendered.quads import Built, joined
 
 Rng = np.random.Generator
 SIDE = 5.0
@@ -18,7 +17,7 @@ ARM = 0.04
 """Metres from the point that stays to the lens: the arm of a wrist."""
 
 
-def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
+def build(rng: Rng) -> Built:
     """Four walls with posters, floor and ceiling: quads in metres, and textures."""
     b = Builder(rng)
     half = SIDE / 2
@@ -27,7 +26,7 @@ def build(rng: Rng) -> tuple[Quads, list[Bytes]]:
     add_wall(b, [half, half, 0.0], [0, -1.0, 0], SIDE, [-1.0, 0, 0])
     add_wall(b, [-half, -half, 0.0], [0, 1.0, 0], SIDE, [1.0, 0, 0])
     add_level(b, [-half, -half], [SIDE, SIDE])
-    return joined(b.parts), b.images
+    return Built(joined(b.parts), b.images)
 
 
 def path(rng: Rng) -> motion.Path:

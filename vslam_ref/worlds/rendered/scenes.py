@@ -6,14 +6,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from vslam_ref.arrays import Array
 from vslam_ref.geometry.cameras import Camera, Fov, Pinhole
 from vslam_ref.support.errors import InputError, suggestion
-from vslam_ref.worlds.rendered import building, corridor, desk, rotation
+from vslam_ref.worlds.rendered import building, corridor, desk, hall, people, rotation
 from vslam_ref.worlds.rendered.motion import Path
-from vslam_ref.worlds.rendered.quads import Quads
+from vslam_ref.worlds.rendered.quads import Built
 from vslam_ref.worlds.rendered.record import EXACT, Effects, RenderedScene
-from vslam_ref.worlds.rendered.textures import Bytes, pack
+from vslam_ref.worlds.rendered.textures import pack
 
 SIZE = (640, 480)
 RATE = 30.0
@@ -21,12 +23,18 @@ RATE = 30.0
 
 
 class Recipe(NamedTuple):
-    """How a scene is made: things, path, how long it is (seconds), and the focal length over the width."""
+    """How a scene is made.
 
-    build: Callable[[np.random.Generator], tuple[Quads, list[Bytes]]]
+    Things, path, how long it is (seconds), and the focal length over the width; whose things they are, if
+    another scene's; and for a vehicle that carries the camera, its poses (..., 3) at times (...), seconds.
+    """
+
+    build: Callable[[np.random.Generator], Built]
     path: Callable[[np.random.Generator], Path]
     seconds: float
     focal: float
+    things_of: str = ""
+    vehicle: Callable[[ArrayLike], Array] | None = None
 
 
 RECIPES = {
@@ -34,6 +42,8 @@ RECIPES = {
     "corridor": Recipe(corridor.build, corridor.path, corridor.SECONDS, 0.62),
     "rotation": Recipe(rotation.build, rotation.path, rotation.SECONDS, 0.8),
     "building": Recipe(building.build, building.path, building.SECONDS, 0.62),
+    "hall": Recipe(hall.build, hall.path_right, hall.SECONDS, hall.FOCAL, "", hall.vehicle_at),
+    "hall-ahead": Recipe(hall.build, hall.path_ahead, hall.SECONDS, hall.FOCAL, "hall", hall.vehicle_at),
 }
 NAMES = tuple(RECIPES)
 
@@ -58,12 +68,13 @@ def scene(
     size: tuple[int, int] = SIZE,
     frames: int | None = None,
     effects: Effects = EXACT,
+    passers_by: int = 0,
 ) -> RenderedScene:
     """Make a scene.
 
     Parameters
     ----------
-    name : {"desk", "corridor", "rotation", "building"}
+    name : {"desk", "corridor", "rotation", "building", "hall", "hall-ahead"}
     seed : int
         Root of all randomness: textures, places of things, the path, noise.
     camera : Camera, optional
@@ -74,6 +85,8 @@ def scene(
         Only the first pictures of the path; by default all, at 30 Hz.
     effects : Effects
         By default none: the pictures are exact.
+    passers_by : int
+        How many people walk through the hall, 0 to 99; nothing else changes with them.
 
     Raises
     ------
@@ -97,10 +110,23 @@ def scene(
     count = most if frames is None else frames
     if not 1 <= count <= most:
         raise ValueError(f"{count} pictures of {name}: need 1 to {most}")
-    things, way = (
-        np.random.default_rng(s) for s in np.random.SeedSequence([seed, NAMES.index(name)]).spawn(2)
+    if not 0 <= passers_by <= (99 if recipe.vehicle else 0):
+        raise ValueError(f"{passers_by} passers-by in {name}: need 0 to 99, in the hall, and 0 elsewhere")
+    root = [seed, NAMES.index(recipe.things_of or name)]
+    things, way, walk = (np.random.default_rng(s) for s in np.random.SeedSequence(root).spawn(3))
+    quads, images, landmarks = recipe.build(things)
+    walkers, cloth = people.walkers(walk, passers_by, len(images))
+    return RenderedScene(
+        name,
+        quads,
+        pack([*images, *cloth]),
+        pinhole(name, size) if camera is None else camera,
+        size,
+        recipe.path(way),
+        np.arange(count) / RATE,
+        effects,
+        seed,
+        landmarks,
+        people.crowd(walkers) if walkers else None,
+        recipe.vehicle,
     )
-    quads, images = recipe.build(things)
-    lens = pinhole(name, size) if camera is None else camera
-    times = np.arange(count) / RATE
-    return RenderedScene(name, quads, pack(images), lens, size, recipe.path(way), times, effects, seed)
