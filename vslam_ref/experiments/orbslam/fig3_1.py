@@ -253,5 +253,5 @@ EXPERIMENT = Experiment(
         "watched": "whether the stopwatch saw the box's stage; (pictures, boxes)",
         "unknown": "stages that no box has; (stages,)",
     },
-    quick={"pictures": 45},
+    quick={"pictures": 40},
 )
