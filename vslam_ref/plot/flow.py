@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,16 +14,18 @@ from vslam_ref.plot import style
 
 WIDE, HIGH, STEP, UP, GAP = 1.5, 0.78, 1.95, 2.3, 0.06
 """Of the boxes: width, height, from one to the next, from row to row, and from a box to an arrow."""
+DOWN = 1.9
+"""From process to process."""
 PALE = "#F2F2F2"
 WHITE = {"fc": "white", "ec": "none", "pad": 1.5}
 
 
 class FlowBox(NamedTuple):
-    """A stage, in how many pictures it had a part, and its median milliseconds (NaN: never)."""
+    """A stage, in how many pictures it had a part, its median milliseconds (NaN: never; None: not told)."""
 
     name: str
     pictures: int
-    ms: float
+    ms: float | None
 
 
 def flow_figure(
@@ -55,10 +57,48 @@ def flow_figure(
     return figure
 
 
+def processes_figure(rows: Mapping[str, Sequence[FlowBox]], told: Mapping[str, str]) -> Figure:
+    """Draw processes below each other, each from left to right, and the map that they share.
+
+    ``told`` says of each process what passed through it.
+    """
+    colours = (style.SKY, style.ORANGE, style.GREEN)
+    with style.house_style():
+        figure, (panel,) = style.new_figure(1.0 + 1.55 * len(rows))
+        panel.grid(False)
+        panel.set(xticks=[], yticks=[])
+        for spine in panel.spines.values():
+            spine.set_visible(False)
+        count = max(map(len, rows.values()))
+        panel.set_xlim(-2.1, count * STEP + 0.75)
+        panel.set_ylim(-0.75, (len(rows) - 1) * DOWN + 0.75)
+        tall = (len(rows) - 1) * DOWN
+        end = count * STEP - 0.1
+        for k, (name, boxes) in enumerate(rows.items()):
+            y = tall - k * DOWN
+            _row(panel, boxes, y, colours[k % len(colours)], range(len(boxes)))
+            _arrow(panel, ((len(boxes) - 1) * STEP + WIDE / 2 + GAP, y), (end - GAP, y), "<|-|>")
+            panel.text(-0.95, y, f"{name}:\n{told[name]}", ha="right", va="center", fontsize=10)
+            if k:
+                _arrow(panel, ((count - 1) * STEP, y + DOWN - HIGH / 2 - GAP), (0.0, y + HIGH / 2 + GAP))
+                panel.text(0.5 * (count - 1) * STEP, y + DOWN / 2, "keyframe", fontsize=9, bbox=WHITE,
+                           ha="center", va="center")  # fmt: skip
+        panel.add_patch(
+            FancyBboxPatch((end, -HIGH / 2), 0.6, tall + HIGH, boxstyle="round,pad=0.04", fc=PALE,
+                           ec=style.BLACK)
+        )  # fmt: skip
+        panel.text(end + 0.3, tall / 2, "the map: keyframes, points, covisibility", rotation=90, ha="center",
+                   va="center", fontsize=10, fontweight="bold")  # fmt: skip
+    return figure
+
+
 def _row(panel: Axes, boxes: Sequence[FlowBox], y: float, colour: str, places: Sequence[int]) -> None:
     for k, (box, place) in enumerate(zip(boxes, places, strict=True)):
         often = "once" if box.pictures == 1 else f"{box.pictures} times"
-        told = f"{often}, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
+        if box.ms is None:
+            told = often if box.pictures else "not needed"
+        else:
+            told = f"{often}, {box.ms:.1f} ms" if np.isfinite(box.ms) else "not needed"
         _box(panel, place * STEP, y, colour if box.pictures else PALE, box.name, told)
         if k:
             side = np.sign(place - places[k - 1])
@@ -74,12 +114,12 @@ def _box(panel: Axes, x: float, y: float, colour: str, name: str, told: str) -> 
         FancyBboxPatch((x - WIDE / 2, y - HIGH / 2), WIDE, HIGH, boxstyle="round,pad=0.04", fc=colour,
                        ec=style.BLACK, alpha=0.85, ls=":" if colour == PALE else "-")
     )  # fmt: skip
-    panel.text(x, y + 0.12, name, ha="center", va="center", fontsize=10, fontweight="bold")
+    panel.text(x, y + 0.12, name, ha="center", va="center", fontsize=10, fontweight="bold", linespacing=0.95)
     panel.text(x, y - 0.2, told, ha="center", va="center", fontsize=8)
 
 
-def _arrow(panel: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+def _arrow(panel: Axes, start: tuple[float, float], end: tuple[float, float], heads: str = "-|>") -> None:
     panel.add_patch(
-        FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=13, color=style.BLACK, lw=1.1,
+        FancyArrowPatch(start, end, arrowstyle=heads, mutation_scale=13, color=style.BLACK, lw=1.1,
                         shrinkA=0, shrinkB=0)
     )  # fmt: skip

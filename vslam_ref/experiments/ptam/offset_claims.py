@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,15 @@ HERE = "this library's bounds"
 
 
 def claims(study: Study[dict[str, OffsetRun]]) -> list[Claim]:
-    """Judge every bound of the table."""
+    """Judge every bound of PTAM's table."""
+    return judge(study, recorded())
+
+
+def judge(study: Study[Any], table: Mapping[str, RecordedSequence]) -> list[Claim]:
+    """Judge every bound of a table."""
     found: list[Claim] = []
     for name in study.config.sequences:
-        each, runs = recorded()[name], study.data.get(name)
+        each, runs = table[name], study.data.get(name)
         found += [_no_start(each, runs)] if each.must_not_start else _bounds(each, runs)
     return found
 

@@ -11,7 +11,7 @@ nothing.  Everything else is in the run's own words: a lost picture has no pose,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ import numpy as np
 from vslam_ref.experiments.framework import Experiment, Study
 from vslam_ref.experiments.ptam.offset_claims import claims, counted
 from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
-from vslam_ref.experiments.ptam.recorded import found, open_recorded, recorded
+from vslam_ref.experiments.ptam.recorded import RecordedSequence, found, open_recorded, recorded
 from vslam_ref.experiments.visual_slam import running
 from vslam_ref.support.config import assume, replace_settings
 from vslam_ref.systems.ptam.presets import PRESETS, preset
@@ -57,7 +57,7 @@ class OffsetsConfig:
 
 def available(config: OffsetsConfig) -> list[str]:
     """Names of the sequences that are found, in the table's order."""
-    return [name for name in recorded() if name in config.sequences and found(name)]
+    return [name for name in recorded() if name in config.sequences and found(recorded()[name])]
 
 
 def missing(config: OffsetsConfig) -> list[str]:
@@ -95,8 +95,12 @@ def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
 
 
 def series(study: Study[dict[str, OffsetRun]]) -> dict[str, object]:
-    """All runs by sequence, with the bounds and what other programs reached."""
-    table = recorded()
+    """All runs by sequence, with what other programs reached."""
+    return series_of(study, recorded())
+
+
+def series_of(study: Study[Any], table: Mapping[str, RecordedSequence]) -> dict[str, object]:
+    """All runs of a table."""
     return {
         name: {"unit": table[name].error_unit, "beside": list(table[name].beside)}
         | {field: np.asarray(values).tolist() for field, values in runs._asdict().items()}
@@ -106,11 +110,16 @@ def series(study: Study[dict[str, OffsetRun]]) -> dict[str, object]:
 
 def figure(study: Study[dict[str, OffsetRun]]) -> Figure:
     """Shares and errors of all runs against the bounds and the other programs."""
+    return figure_of(study, recorded())
+
+
+def figure_of(study: Study[Any], table: Mapping[str, RecordedSequence]) -> Figure:
+    """The figure of a table."""
     from vslam_ref.plot.offsets import OffsetRows, offsets_figure
 
     rows = []
     for name, runs in study.data.items():
-        each = recorded()[name]
+        each = table[name]
         if each.must_not_start or each.most_error is None:
             continue
         beside = {str(b["system"]): float(b["error"]) / each.most_error for b in each.beside if "error" in b}

@@ -52,6 +52,8 @@ class RecordedSequence:
     all_start, must_not_start, seen : bool
     beside : tuple of mapping
         Of other systems.
+    revisits : tuple of (int, int)
+        Pictures of one place, the earlier one first.
     """
 
     name: str
@@ -76,17 +78,23 @@ class RecordedSequence:
     all_start: bool = False
     must_not_start: bool = False
     beside: tuple[Mapping[str, Any], ...] = field(default=())
+    revisits: tuple[tuple[int, int], ...] = ()
+
+
+def recorded() -> dict[str, RecordedSequence]:
+    """Every sequence of PTAM's table, by its name."""
+    return read_table(TABLE)
 
 
 @cache
-def recorded() -> dict[str, RecordedSequence]:
-    """Every sequence of the table, by its name."""
-    rows = tomllib.loads(TABLE.read_text(encoding="utf-8"))["sequence"]
+def read_table(path: Path) -> dict[str, RecordedSequence]:
+    """Every sequence of a table, by its name."""
+    rows = tomllib.loads(path.read_text(encoding="utf-8"))["sequence"]
     return {row["name"]: RecordedSequence(**{k: _frozen(v) for k, v in row.items()}) for row in rows}
 
 
 def _frozen(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def open_recorded(each: RecordedSequence, offset: int, pictures: int | None = None) -> Sequence:
@@ -107,9 +115,8 @@ def open_recorded(each: RecordedSequence, offset: int, pictures: int | None = No
     return open_sequence(folder, camera=camera).part(offset, end, 1)
 
 
-def found(name: str) -> bool:
+def found(each: RecordedSequence) -> bool:
     """Whether the pictures of a row are here: those of a rendered scene always are."""
-    each = recorded()[name]
     return not each.data_set or catalogue.find(each.data_set) is not None
 
 
