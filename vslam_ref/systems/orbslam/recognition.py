@@ -18,6 +18,8 @@ the number of squares of the picture that hold an inlier, times the share of the
 How much is asked for was chosen on rendered look-alikes (``python -m
 vslam_ref.experiments.orbslam.lookalikes``): over sixteen buildings the most support of a wrong candidate is
 15.7, and 10.8 where the picture before agrees; the thresholds are a tenth above, rounded up.
+They are too low where pictures follow more densely: of three fresh buildings with a picture a metre, one had
+three wrong places accepted, although all 135 revisits were found.
 """
 
 from __future__ import annotations
