@@ -110,12 +110,12 @@ def test_the_rule_of_the_thresholds() -> None:
     )
     # most of wrong: 30; of two together: (99, 18) near and (19, 30) near; (18, 19) and (30, 29) are far apart
     assert lookalikes.choose([seen], 3) == (33, 21)
-    few = replace_squares(seen, 10)
+    few = replace_support(seen, 10)
     assert lookalikes.choose([few, seen], 3) == (33, 21)
 
 
-def replace_squares(seen: SeenPictures, squares: int) -> SeenPictures:
-    return seen._replace(squares=np.full(5, squares))
+def replace_support(seen: SeenPictures, support: int) -> SeenPictures:
+    return seen._replace(support=np.full(5, float(support)))
 
 
 def test_the_buildings_that_chose_are_not_judged() -> None:

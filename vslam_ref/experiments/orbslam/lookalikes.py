@@ -2,7 +2,7 @@
 
     python -m vslam_ref.experiments.orbslam.lookalikes        # print the choice, and what it rests on
 
-The rule: ``sure`` is a tenth more than the most squares of a wrong candidate, one whose picture shares no
+The rule: ``sure`` is a tenth more than the most support of a wrong candidate, one whose picture shares no
 scene point with the query; ``likely`` is a tenth more than the most with which a wrong candidate would be
 accepted on the word of the picture before; both rounded up.  The seeds here are for choosing only.
 """
@@ -25,8 +25,11 @@ from vslam_ref.worlds.rendered import Effects
 from vslam_ref.worlds.rendered.lookalikes import lookalikes, overlap
 from vslam_ref.worlds.rendered.record import RenderedScene
 
-CHOOSING = tuple(range(21, 29))
+CHOOSING = (*range(21, 29), *range(41, 49))
 EFFECTS = Effects(noise=3.0, exposure=0.15, shutter=0.01, blur_samples=3)
+HARDER = Effects(noise=5.0, exposure=0.3, shutter=0.02, blur_samples=3)
+"""Of the buildings that choose; their pictures are two metres apart, so that revisits look less alike."""
+PICTURES, GAP = 45, 4
 FEATURES = OrbSettings(features=1000)
 MARGIN = 1.1
 SEEN = 0.2
@@ -41,8 +44,8 @@ class SeenPictures(NamedTuple):
     ----------
     entry : ndarray of int, shape (K,)
         The best candidate of each picture, -1 without one.
-    squares : ndarray of int, shape (K,)
-        Of its pairs.
+    support : ndarray, shape (K,)
+        Of its pairs, squares.
     accepted : ndarray of bool, shape (K,)
     right, wrong : ndarray of bool, shape (K,)
         Whether it shows the same place; whether it shares no scene point.  Some do neither.
@@ -53,7 +56,7 @@ class SeenPictures(NamedTuple):
     """
 
     entry: IntArray
-    squares: IntArray
+    support: Array
     accepted: BoolArray
     right: BoolArray
     wrong: BoolArray
@@ -75,9 +78,9 @@ def features(image: Bytes) -> PictureFeatures:
     return PictureFeatures(found.uv, found.angle, found.descriptor)
 
 
-def world(seed: int, pictures: int = 90) -> RenderedScene:
+def world(seed: int, pictures: int = 90, effects: Effects = EFFECTS) -> RenderedScene:
     """The look-alikes of a seed."""
-    return lookalikes(seed, pictures=pictures, effects=EFFECTS)
+    return lookalikes(seed, pictures=pictures, effects=effects)
 
 
 def recognised(
@@ -105,7 +108,7 @@ def judged_by(
     rows, there = np.arange(len(found)), entry >= 0
     return SeenPictures(
         entry,
-        np.array([one.best.squares for one in found]),
+        np.array([one.best.support for one in found]),
         np.array([one.entry >= 0 for one in found]),
         there & right[rows, entry],
         there & wrong[rows, entry],
@@ -130,37 +133,37 @@ def choose(worlds: list[SeenPictures], near: int) -> tuple[int, int]:
     >>> choose([one], 3)
     (21, 14)
     """
-    sure = max(int(one.squares[one.wrong].max(initial=0)) for one in worlds)
-    together = 0
+    sure = max(float(one.support[one.wrong].max(initial=0)) for one in worlds)
+    together = 0.0
     for one in worlds:
-        both = np.minimum(one.squares[1:], one.squares[:-1])
+        both = np.minimum(one.support[1:], one.support[:-1])
         close = np.abs(np.diff(one.entry)) <= near
-        together = max(together, int(both[one.wrong[1:] & close & (one.entry[:-1] >= 0)].max(initial=0)))
+        together = max(together, float(both[one.wrong[1:] & close & (one.entry[:-1] >= 0)].max(initial=0)))
     return math.ceil(MARGIN * sure), math.ceil(MARGIN * together)
 
 
 def main() -> int:
     """Print the choice."""
-    settings, vocabulary, worlds = RecognitionSettings(), shipped_vocabulary(), []
+    settings, vocabulary, worlds = RecognitionSettings(gap=GAP), shipped_vocabulary(), []
     for seed in CHOOSING:
-        made = world(seed)
+        made = world(seed, PICTURES, HARDER)
         given = [features(made.frame(k)) for k in range(len(made))]
         right, wrong = truth(overlap(made))
         seen = judged_by(recognised(given, vocabulary, settings, seed), right, wrong)
         worlds.append(seen)
         back = right[np.arange(len(made)), : len(made) // 2].any(1) & (np.arange(len(made)) >= len(made) // 2)
-        top = sorted(seen.squares[seen.wrong].tolist(), reverse=True)[:5]
+        top = sorted(seen.support[seen.wrong].tolist(), reverse=True)[:5]
         sure, likely = choose(worlds, settings.near)
-        low = np.percentile(seen.squares[seen.right & back], [0, 10, 50])
+        low = np.percentile(seen.support[seen.right & back], [0, 10, 50])
         print(
-            f"seed {seed}: revisits {back.sum()}, right {(seen.right & back).sum()} with squares {low}; "
+            f"seed {seed}: revisits {back.sum()}, right {(seen.right & back).sum()} with support {low}; "
             f"wrong {seen.wrong.sum()}, most {top}; so far sure {sure}, likely {likely}",
             flush=True,
         )
     for one in worlds:
-        both = np.minimum(one.squares, np.concatenate([[0], one.squares[:-1]]))
+        both = np.minimum(one.support, np.concatenate([[0], one.support[:-1]]))
         near = np.abs(one.entry - np.concatenate([[-99], one.entry[:-1]])) <= settings.near
-        found = (one.squares >= sure) | (near & (both >= likely))
+        found = (one.support >= sure) | (near & (both >= likely))
         print(f"found {(found & one.right).sum()}, wrong {(found & one.wrong).sum()}")
     return 0
 

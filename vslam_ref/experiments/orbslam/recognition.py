@@ -4,8 +4,11 @@ Each picture is compared with those before.  Right is a candidate that shows the
 by its marked pairs, in the look-alikes by the scene points that both pictures show.  Wrong is any other in
 the corridor, and in the look-alikes one without a common scene point.
 
-The thresholds of recognition were chosen on look-alikes of other seeds, and fixed before the corridor's
-pictures were opened; the vocabularies are trained on other pictures.
+The thresholds of recognition were chosen on look-alikes of other seeds; the vocabularies are trained on other
+pictures.  The corridor has been opened twice.  The first time, thresholds on squares alone, with pairs under
+common nodes, found 35 of the 44 revisits and none wrong.  What is measured since, squares times the share of
+verified pairs, and all features with all, was again chosen on look-alikes and fixed before the second time;
+but that something was looked for at all is due to the first, so the corridor is no longer quite unseen.
 """
 
 from __future__ import annotations
@@ -68,7 +71,8 @@ class RecognitionRuns(NamedTuple):
 
     Attributes
     ----------
-    entry, squares : ndarray of int, shape (runs, pictures)
+    entry : ndarray of int, shape (runs, pictures)
+    support : ndarray, shape (runs, pictures)
     accepted, right, wrong : ndarray of bool, shape (runs, pictures)
     first : ndarray of int, shape (runs, pictures)
     score : ndarray, shape (runs, pictures)
@@ -77,7 +81,7 @@ class RecognitionRuns(NamedTuple):
     """
 
     entry: IntArray
-    squares: IntArray
+    support: Array
     accepted: BoolArray
     right: BoolArray
     wrong: BoolArray
@@ -266,12 +270,12 @@ def seeds(config: RecognitionConfig, point: None) -> list[int]:
 
 
 def series(study: Study[RecognitionRuns]) -> dict[str, object]:
-    """Precision and recall by words and by squares, for each size."""
+    """Precision and recall by words and by support, for each size."""
     walked: Walked = study.once
     told: dict[str, object] = {"words": walked.sizes, "revisits": walked.revisits}
     for size, seen, first in zip(walked.sizes, walked.seen, walked.right_first, strict=True):
         told[f"score_{size}"] = precision_recall(seen.score, first, walked.revisits)
-        told[f"squares_{size}"] = precision_recall(seen.squares.astype(float), seen.right, walked.revisits)
+        told[f"support_{size}"] = precision_recall(seen.support, seen.right, walked.revisits)
         told[f"accepted_{size}"] = [
             int((seen.accepted & seen.right).sum()),
             int((seen.accepted & ~seen.right).sum()),
@@ -280,20 +284,20 @@ def series(study: Study[RecognitionRuns]) -> dict[str, object]:
 
 
 def figure(study: Study[RecognitionRuns]) -> Figure:
-    """Precision over recall in the corridor, by words and by geometry; squares in the look-alikes."""
+    """Precision over recall in the corridor, by words and by geometry; support in the look-alikes."""
     from vslam_ref.plot.recognition import recognition_figure
 
     walked: Walked = study.once
     curves = [
         (
             precision_recall(seen.score, first, walked.revisits),
-            precision_recall(seen.squares.astype(float), seen.right, walked.revisits),
+            precision_recall(seen.support, seen.right, walked.revisits),
         )
         for seen, first in zip(walked.seen, walked.right_first, strict=True)
     ]
     data, settings = study.data, RecognitionSettings()
     right, wrong = (
-        data.squares[kind & (data.entry >= 0)] for kind in (data.right & data.revisit, data.wrong)
+        data.support[kind & (data.entry >= 0)] for kind in (data.right & data.revisit, data.wrong)
     )
     return recognition_figure(walked.sizes, curves, right, wrong, settings.sure)
 
@@ -312,7 +316,7 @@ EXPERIMENT = Experiment(
     missing=missing,
     about={
         "entry": "best candidate of each picture, -1 without one; (runs, pictures)",
-        "squares": "squares of the picture that hold a verified pair, a count; (runs, pictures)",
+        "support": "squares with a verified pair times the share of verified pairs; (runs, pictures)",
         "accepted": "whether the place was recognised; (runs, pictures)",
         "right": "whether the candidate shows the same place; (runs, pictures)",
         "wrong": "whether the candidate shares no scene point; (runs, pictures)",
