@@ -181,3 +181,17 @@ def pose(b: Belief) -> tuple[Array, Array]:
     J[0, 0] = J[1, 1] = 1.0
     J[2, 2:4] = np.array([c, -s]) / (s * s + c * c)
     return np.array([x, y, np.arctan2(s, c)]), J @ b.P @ J.T
+
+
+def composed(b: Belief, i: int) -> tuple[Array, Array]:
+    """Landmark i of a reduced belief in the world: p + R(theta) r_i (2,) and its covariance (2, 2)."""
+    at, X = 4 + 2 * b.ids.index(i), pose(b)[0]
+    r1, r2 = b.Z[at : at + 2]
+    s, c = np.sin(X[2]), np.cos(X[2])
+    place = np.array([X[0] + c * r1 - s * r2, X[1] + s * r1 + c * r2])  # eq-composed
+    J = np.zeros((2, len(b.Z)))
+    to_theta = np.array([b.Z[3], -b.Z[2]]) / (b.Z[2] ** 2 + b.Z[3] ** 2)  # of (sin, cos)
+    J[0, 0] = J[1, 1] = 1.0
+    J[0, 2:4], J[1, 2:4] = (X[1] - place[1]) * to_theta, (place[0] - X[0]) * to_theta
+    J[:, at : at + 2] = [[c, -s], [s, c]]
+    return place, J @ b.P @ J.T  # eq-composed-covariance

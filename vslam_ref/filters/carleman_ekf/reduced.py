@@ -17,16 +17,20 @@ arrives.  A prediction then costs O(1), a measurement O(k n^2).
 Increments compose as well.  They are put down, up to ``WAITING`` of them, and used together when a
 measurement arrives or the pose is asked for: what they do is a handful of sums and products over them.
 
-``with_map=True`` carries each landmark's world coordinates too, 4 + 4 n states.
+``with_map=True`` carries each landmark's world coordinates too, 4 + 4 n states; without them the map is
+composed from pose and r_i when it is asked for (``landmarks(readout="composed")``).
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import Array, IntArray, transpose
 from vslam_ref.filters.block_covariance import Blocks, diagonal_blocks
+from vslam_ref.filters.carleman_ekf.composition import compose_first_order, compose_gaussian
 from vslam_ref.filters.carleman_ekf.reduced_moments import control_gaussian, start_moments
 from vslam_ref.filters.carleman_ekf.reduced_step import (
     as_matrix,
@@ -49,6 +53,8 @@ from vslam_ref.filters.vehicle import Increment
 
 WAITING = 16
 """Increments put down before they are used at the latest."""
+
+READOUTS = ("lifted", "composed", "composed_gaussian")
 
 
 class ReducedCarlemanEkf(SlamFilter):
@@ -181,16 +187,48 @@ class ReducedCarlemanEkf(SlamFilter):
         b = self.blocks
         return heading_vector_pose(b.x_p, b.P_pp)
 
-    def landmarks(self) -> MapEstimate:
-        """The map in the world frame; needs ``with_map=True``.
+    def landmarks(self, readout: str = "lifted") -> MapEstimate:
+        """The map in the world frame.
+
+        Parameters
+        ----------
+        readout : {"lifted", "composed", "composed_gaussian"}
+            The states z_i1 and z_i2, which need ``with_map=True``; or p + R(theta) r_i of any reduced
+            filter, to first order or with the exact moments of a Gaussian.
 
         Raises
         ------
         ValueError
-            Without the map's states: z_i1 and z_i2 are no functions of the 4 + 2 n reduced states.
+            On another name; and for the lifted map without the map's states: z_i1 and z_i2 are no functions
+            of the 4 + 2 n reduced states.
         """
+        if readout not in READOUTS:
+            raise ValueError(f"readout={readout!r}: must be one of {', '.join(READOUTS)}")
+        if readout != "lifted":
+            return self._composed(compose_first_order if readout == "composed" else compose_gaussian)
         if not self.with_map:
-            raise ValueError("this filter carries no map: build it with with_map=True (form='reduced-map')")
+            raise ValueError(
+                "this filter carries no map: build it with with_map=True (form='reduced-map'), "
+                "or read readout='composed'"
+            )
         b = self._applied()
         mean = b.x_m.reshape(len(b.x_p), -1, 4)[:, :, 2:].copy()
         return MapEstimate(b.ids, mean, diagonal_blocks(b.P_mm, 4)[:, :, 2:, 2:].copy())
+
+    def _composed(self, compose: Callable[[Array, Array, Array], tuple[Array, Array]]) -> MapEstimate:
+        """The map composed from pose and r_i = c rho_i - tau."""
+        b, (c, tau) = self._applied(), self._frame.T[:2, :, None]
+        turn, (x, y, s, h) = as_matrix(c), b.x_p.T
+        to_pose = np.zeros((len(b.x_p), 1, 3, 4))
+        to_pose[:, 0, 0, 0] = to_pose[:, 0, 1, 1] = 1.0
+        to_pose[:, 0, 2, 2], to_pose[:, 0, 2, 3] = h / (s * s + h * h), -s / (s * s + h * h)
+        rho = b.x_m.reshape(len(x), -1, b.b)
+        r = c * (rho[..., 0] + 1j * rho[..., 1]) - tau
+        P_pr = b.P_pm.reshape(len(x), 4, -1, b.b).swapaxes(1, 2)[..., :2]
+        P = np.empty((*r.shape, 5, 5))
+        P[..., :3, :3] = to_pose @ b.P_pp[:, None] @ transpose(to_pose)
+        P[..., :3, 3:] = to_pose @ P_pr @ transpose(turn)
+        P[..., 3:, :3] = transpose(P[..., :3, 3:])
+        P[..., 3:, 3:] = turn @ diagonal_blocks(b.P_mm, b.b)[:, :, :2, :2] @ transpose(turn)
+        pose = np.stack([x, y, np.arctan2(s, h)], -1)[:, None]
+        return MapEstimate(b.ids, *compose(pose, P, np.stack([r.real, r.imag], -1)))
