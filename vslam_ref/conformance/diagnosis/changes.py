@@ -52,7 +52,7 @@ LOST: dict[str, Callable[[Array], Any]] = {
     "is rounded to whole numbers": np.round,
     "is rounded down to whole numbers": np.floor,
     "is rounded to single precision": lambda x: x.astype(np.float32).astype(np.float64),
-    "is brought to unit length first": lambda x: x / np.linalg.norm(x, axis=-1, keepdims=True),
+    "is brought to unit length first": lambda x: _unit(x),
 }
 """What the program does to an input, where it cannot be undone."""
 MOST_ENTRIES = 12
@@ -64,6 +64,12 @@ def _square(x: Array) -> Array:
     if x.ndim < 2 or x.shape[-1] != x.shape[-2]:
         raise ValueError("no square matrix")
     return x
+
+
+def _unit(x: Array) -> Array:
+    if np.array_equal(x, np.round(x)):
+        raise ValueError("indices are no direction")
+    return np.asarray(x / np.linalg.norm(x, axis=-1, keepdims=True))
 
 
 def _rows(x: Array, dimensions: int) -> Array:
@@ -215,11 +221,18 @@ def on(name: str, change: Callable[[Array], Any]) -> Change:
             other = np.asarray(change(x))
         if np.abs(other).max(initial=0.0) > LARGER * max(1.0, float(np.abs(x).max(initial=0.0))):
             raise ValueError("a loop over so many would not end")
+        if _whole(given[name]) and not np.array_equal(other, np.round(other)):
+            raise ValueError("a count or an index is a whole number")
         if not np.isfinite(other).all() or (other.shape == x.shape and np.array_equal(other, x)):
             raise ValueError("no change")
         return {**given, name: other.tolist()}
 
     return changed
+
+
+def _whole(value: Any) -> bool:
+    """Whether an input is written in whole numbers only: counts, indices."""
+    return all(map(_whole, value)) if isinstance(value, list) else isinstance(value, int)
 
 
 def _both(a: str, b: str, *, back: bool) -> Change:
