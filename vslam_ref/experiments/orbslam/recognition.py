@@ -4,13 +4,14 @@ Each picture is compared with those before.  Right is a candidate that shows the
 by its marked pairs, in the look-alikes by the scene points that both pictures show.  Wrong is any other in
 the corridor, and in the look-alikes one without a common scene point.
 
-The thresholds of recognition were chosen on look-alikes of other seeds; the vocabularies are trained on other
-pictures.  The corridor, though, has been opened three times.  The first time, thresholds on squares alone, with
-pairs under common nodes, found 35 of the 44 revisits and none wrong.  The second time, squares times the share
-of verified pairs, and all features with all, found 41 and none wrong, but accepted wrong places in look-alikes
-with a picture a metre.  The rule of now was made by who had seen the support of the corridor's pictures: that
-there is a second threshold at all is owed to this, although neither number is.  What the corridor says is
-therefore that the rule works there, not how it does where nobody has looked; that the look-alikes say.
+The thresholds of recognition were chosen on look-alikes of other seeds; the vocabularies are trained on
+other pictures. The corridor, though, has been opened three times. The first time, thresholds on squares
+alone, with pairs under common nodes, found 35 of the 44 revisits and none wrong. The second time, squares
+times the share of verified pairs, and all features with all, found 41 and none wrong, but accepted wrong
+places in look-alikes with a picture a metre. The rule of now was made by who had seen the support of the
+corridor's pictures: that there is a second threshold at all is owed to this, although neither number is.
+What the corridor says is therefore that the rule works there, not how it does where nobody has looked; that
+the look-alikes say.
 """
 
 from __future__ import annotations

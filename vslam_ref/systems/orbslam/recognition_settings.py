@@ -2,7 +2,7 @@
 
 The thresholds were chosen by ``python -m vslam_ref.experiments.orbslam.lookalikes``, on four buildings of
 look-alikes with a picture a metre and with one every two metres.  The most support of a wrong candidate is
-19.7 (18.8 in the next building; with a picture every two metres 15.6): ``sure`` is a tenth above it, rounded
+19.7 (18.8 in another building; with a picture every two metres 15.6): ``sure`` is a tenth above it, rounded
 up.  No wrong candidate followed a sure one near it with more than 10: ``likely`` is half of ``sure``.  There
 they accept 175 of 180 revisits with a picture a metre, 81 of 92 with one every two, and no wrong place.
 
