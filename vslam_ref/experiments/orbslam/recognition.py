@@ -12,6 +12,10 @@ places in look-alikes with a picture a metre. The rule of now was made by who ha
 corridor's pictures: that there is a second threshold at all is owed to this, although neither number is.
 What the corridor says is therefore that the rule works there, not how it does where nobody has looked; that
 the look-alikes say.
+
+Judged once, with the vocabulary that is shipped: buildings 310, 311 and 312, 131 of 135 revisits with a
+picture a metre, 60 of 69 with one every two, 0 of 147 wrong candidates accepted; the corridor, 40 of 44,
+none wrong.
 """
 
 from __future__ import annotations

@@ -22,7 +22,8 @@ SIZES = ((10, 3), (8, 4), (10, 4), (10, 5))
 """Children of a node and levels of each vocabulary."""
 SHIPPED = SIZES.index((words.BRANCHING, words.LEVELS))
 FOREIGN = "dbow2_vocab_small"
-"""Vocabularies of other programs, of ORB with another table of pairs."""
+"""Vocabularies of other programs, of ORB with another table of pairs: in the corridor 30 and 35 are found,
+and one place wrongly with the smaller one."""
 
 
 @dataclass(frozen=True)
