@@ -112,7 +112,7 @@ def simulate(config: RecognitionConfig, point: None, seed: int) -> RecognitionRu
     """One building, with a picture a metre, then with one every two metres."""
     both = spaced(seed, vocabulary(*SIZES[SHIPPED]), config.pictures)
     joined = [np.concatenate(field) for field in zip(*(seen for seen, _ in both), strict=True)]
-    return RecognitionRuns(*joined, np.concatenate([back for _, back in both]))
+    return RecognitionRuns._make([*joined, np.concatenate([back for _, back in both])])
 
 
 def walk(config: RecognitionConfig) -> Walked:
