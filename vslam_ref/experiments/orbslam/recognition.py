@@ -9,9 +9,9 @@ other pictures. The corridor, though, has been opened three times. The first tim
 alone, with pairs under common nodes, found 35 of the 44 revisits and none wrong. The second time, squares
 times the share of verified pairs, and all features with all, found 41 and none wrong, but accepted wrong
 places in look-alikes with a picture a metre. The rule of now was made by who had seen the support of the
-corridor's pictures: that there is a second threshold at all is owed to this, although neither number is.
-What the corridor says is therefore that the rule works there, not how it does where nobody has looked; that
-the look-alikes say.
+corridor's pictures: that there is a second threshold, and that it may be as low as half of the first, is
+owed in part to this. What the corridor says is therefore that the rule works there, not how it does where
+nobody has looked; that the look-alikes say.
 
 Judged once, with the vocabulary that is shipped: buildings 310, 311 and 312, 131 of 135 revisits with a
 picture a metre, 60 of 69 with one every two, 0 of 147 wrong candidates accepted; the corridor, 40 of 44,
