@@ -9,7 +9,7 @@ import pytest
 
 from vslam_ref.datasets import catalogue
 from vslam_ref.experiments.framework import Study, load
-from vslam_ref.experiments.orbslam import corridor, lookalikes, recognition
+from vslam_ref.experiments.orbslam import corridor, lookalikes, recognition, recognition_walks
 from vslam_ref.experiments.orbslam.lookalikes import SeenPictures
 from vslam_ref.support.errors import InputError
 
@@ -35,15 +35,16 @@ def drawn(
     config = load("orbslam-recognition").default()
     seen = walk_of(found, wrong, alone)
     rows = np.arange(K)
-    walked = recognition.Walked(
-        [1000, 4000, 10000, 40000],
-        [seen] * 4,
-        [(rows >= K - REVISITS) & (rows < K - REVISITS + n) for n in first],
+    walked = recognition_walks.Walked(
+        ["1000", "4000", "10000", "40000", "foreign"],
+        [1000, 4000, 10000, 40000, 700],
+        [seen] * 5,
+        [(rows >= K - REVISITS) & (rows < K - REVISITS + n) for n in (*first, 9)],
         REVISITS,
     )
-    shape = (config.runs, 90)
-    revisit = np.broadcast_to(np.arange(90) >= 45, shape)
-    data = recognition.RecognitionRuns(
+    shape = (config.runs, 90 + 45)  # a picture a metre, and every second one
+    revisit = np.broadcast_to(np.r_[np.arange(90) >= 45, np.arange(45) >= 22], shape)
+    data = recognition_walks.RecognitionRuns(
         np.full(shape, 2),
         np.where(revisit, 50, 12),
         revisit.copy(),
@@ -75,16 +76,37 @@ def test_each_claim_fails_where_it_is_false() -> None:
     assert lost(drawn(first=(40, 40, 41, 44))) == {"ten-thousand-words-are-enough"}
 
 
+def with_accepted(study: Study, run: int, places: int | slice, value: bool) -> Study:
+    accepted = study.data.accepted.copy()
+    accepted[run, places] = value
+    return replace(study, data=study.data._replace(accepted=accepted))
+
+
 def test_one_building_is_enough_to_lose_the_look_alikes() -> None:
     study = drawn()
-    accepted = study.data.accepted.copy()
-    accepted[3, 10] = True  # a picture of the first round: wrong
-    assert lost(replace(study, data=study.data._replace(accepted=accepted))) == {"lookalikes-are-told-apart"}
-    accepted = study.data.accepted.copy()
-    accepted[2, 45:50] = False  # 40 of 45 are less than nine of ten
-    assert lost(replace(study, data=study.data._replace(accepted=accepted))) == {"lookalikes-are-told-apart"}
-    accepted[2, 45] = True
-    assert lost(replace(study, data=study.data._replace(accepted=accepted))) == set()
+    one = {"lookalikes-are-told-apart"}
+    assert lost(with_accepted(study, 3, 10, True)) == one  # a picture of the first round: wrong
+    assert lost(with_accepted(study, 3, 95, True)) == one  # at the other spacing
+    few = with_accepted(study, 2, slice(45, 50), False)  # 40 of 45 are less than nine of ten
+    assert lost(few) == one
+    assert lost(with_accepted(few, 2, 45, True)) == set()
+    assert lost(with_accepted(study, 2, slice(112, 130), False)) == set()  # told, and not asked for
+
+
+def test_the_rates_of_the_look_alikes_have_intervals() -> None:
+    """Two of 5 x (45 + 22) wrong candidates, in one of five buildings; Wilson's ends by hand.
+
+    335 tries, 2 hits, z^2 = 3.8415: (2 + 1.9207 -+ 1.96 sqrt(2 * 333 / 335 + 0.9604)) / 338.8415.
+    """
+    study = with_accepted(drawn(), 3, slice(10, 12), True)
+    (claim,) = (c for c in recognition.claims(study) if c.id == "lookalikes-are-told-apart")
+    rates = claim.measured["rates"]
+    assert rates["wrong"][:2] == (2, 335)
+    assert rates["wrong"][2:] == pytest.approx([0.00164, 0.02150], abs=1e-5)
+    assert rates["buildings"][:2] == (1, 5)
+    assert rates["buildings"][2:] == pytest.approx([0.0362, 0.6245], abs=1e-4)  # published tables of Wilson's
+    assert rates["found"][:2] == (225, 225)
+    assert rates["found_sparse"][:2] == (115, 115)
 
 
 def test_precision_and_recall_end_with_all_pictures() -> None:
@@ -97,25 +119,40 @@ def test_precision_and_recall_end_with_all_pictures() -> None:
 
 
 def test_the_rule_of_the_thresholds() -> None:
-    """A tenth above the wrong candidates' most, rounded up; agreement needs neighbours, in time and place."""
-    flags = np.zeros(5, np.bool_)
+    """A tenth above the wrong candidates' most, rounded up; after a sure place near it, and half at least."""
+    flags = np.zeros(6, np.bool_)
+    right = np.array([True, False, False, False, True, False])
     seen = SeenPictures(
-        np.array([1, 2, 40, 41, 7]),
-        np.array([99, 18, 19, 30, 29]),
+        np.array([1, 2, 40, 41, 7, 20]),
+        np.array([99, 18, 19, 30, 60, 29]),
         flags,
-        np.array([True, False, False, False, True]),
-        np.array([False, True, True, True, False]),
+        right,
+        ~right,
         flags,
         flags,
     )
-    # most of wrong: 30; of two together: (99, 18) near and (19, 30) near; (18, 19) and (30, 29) are far apart
-    assert lookalikes.choose([seen], 3) == (33, 21)
-    few = replace_support(seen, 10)
-    assert lookalikes.choose([few, seen], 3) == (33, 21)
+    # most of wrong: 30, so sure 33; near after a sure one: 18 after 99; 30 follows 19; 29 after 60 is far off
+    assert lookalikes.choose([seen], 3) == (33, 20)
+    apart = seen._replace(entry=np.array([1, 9, 40, 41, 7, 20]))
+    assert lookalikes.choose([apart], 3) == (33, 17)  # half of 33
+    assert lookalikes.choose([apart, seen], 3) == (33, 20)
 
 
-def replace_support(seen: SeenPictures, support: int) -> SeenPictures:
-    return seen._replace(support=np.full(5, float(support)))
+def test_decided_is_what_the_recogniser_decides() -> None:
+    """Chains go on from an accepted place, and end at a gap, in place or in support."""
+    flags = np.zeros(7, np.bool_)
+    seen = SeenPictures(
+        np.array([3, 4, 5, 6, 30, 31, 32]), np.array([12, 20, 12, 12, 12, 9, 12]), *[flags] * 5
+    )
+    expected = [False, True, True, True, False, False, False]
+    assert lookalikes.decided(seen, (20, 11), 3).tolist() == expected
+    assert lookalikes.decided(seen, (20, 20), 3).tolist() == [False, True, *[False] * 5]
+
+
+def test_revisits_are_of_the_second_round_and_not_just_before() -> None:
+    right = np.zeros((8, 8), np.bool_)
+    right[3, 0] = right[5, 1] = right[6, 4] = right[7, 4] = True
+    assert np.flatnonzero(lookalikes.revisits(right, 2)).tolist() == [5, 7]
 
 
 def test_the_buildings_that_chose_are_not_judged() -> None:

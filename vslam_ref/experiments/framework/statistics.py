@@ -32,3 +32,23 @@ def null_rate(runs: int) -> float:
     from scipy.stats import t
 
     return float(t.sf(1.96 * np.sqrt((runs - 1) / runs), runs - 1))
+
+
+def interval_of_share(hits: int, tries: int) -> list[float]:
+    """Wilson's 95 % interval of a share: all shares whose z-test the count does not refuse.
+
+    It does not shrink to a point where nothing or all was hit.  Tries are taken as independent.
+
+    Examples
+    --------
+    >>> [round(end, 4) for end in interval_of_share(5, 10)]
+    [0.2366, 0.7634]
+    >>> [round(end, 4) for end in interval_of_share(0, 10)]
+    [0.0, 0.2775]
+    """
+    if not 0 <= hits <= tries or tries < 1:
+        raise ValueError(f"{hits} hits of {tries} tries: need a try, and hits from 0 to all")
+    z2 = 1.959963984540054**2
+    middle = (hits + z2 / 2) / (tries + z2)
+    half = np.sqrt(z2 * (hits * (tries - hits) / tries + z2 / 4)) / (tries + z2)
+    return [max(float(middle - half), 0.0), min(float(middle + half), 1.0)]

@@ -1,153 +1,56 @@
-"""Recognition of places: a real corridor walked twice, rendered look-alikes, four vocabularies.
+"""Recognition of places: a real corridor walked twice, rendered look-alikes, many vocabularies.
 
 Each picture is compared with those before.  Right is a candidate that shows the same place: in the corridor
 by its marked pairs, in the look-alikes by the scene points that both pictures show.  Wrong is any other in
 the corridor, and in the look-alikes one without a common scene point.
 
-The thresholds of recognition were chosen on look-alikes of other seeds; the vocabularies are trained on other
-pictures.  The corridor has been opened twice.  The first time, thresholds on squares alone, with pairs under
-common nodes, found 35 of the 44 revisits and none wrong.  What is measured since, squares times the share of
-verified pairs, and all features with all, was again chosen on look-alikes and fixed before the second time;
-but that something was looked for at all is due to the first, so the corridor is no longer quite unseen.
+The thresholds of recognition were chosen on look-alikes of other seeds; the vocabularies are trained on
+other pictures. The corridor, though, has been opened three times. The first time, thresholds on squares
+alone, with pairs under common nodes, found 35 of the 44 revisits and none wrong. The second time, squares
+times the share of verified pairs, and all features with all, found 41 and none wrong, but accepted wrong
+places in look-alikes with a picture a metre. The rule of now was made by who had seen the support of the
+corridor's pictures: that there is a second threshold, and that it may be as low as half of the first, is
+owed in part to this. What the corridor says is therefore that the rule works there, not how it does where
+nobody has looked; that the look-alikes say.
+
+Judged once, with the vocabulary that is shipped: buildings 310, 311 and 312, 131 of 135 revisits with a
+picture a metre, 60 of 69 with one every two, 0 of 147 wrong candidates accepted; the corridor, 40 of 44,
+none wrong.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vslam_ref.arrays import Array, BoolArray, IntArray
+from vslam_ref.arrays import Array, BoolArray
 from vslam_ref.datasets import catalogue
 from vslam_ref.experiments.framework import Claim, Experiment, Study, judged
+from vslam_ref.experiments.framework.statistics import interval_of_share
 from vslam_ref.experiments.orb import words
 from vslam_ref.experiments.orbslam import corridor
-from vslam_ref.experiments.orbslam.lookalikes import (
-    SeenPictures,
-    features,
-    judged_by,
-    recognised,
-    truth,
-    world,
+from vslam_ref.experiments.orbslam.recognition_walks import (
+    SHIPPED,
+    SIZES,
+    RecognitionConfig,
+    RecognitionRuns,
+    Walked,
+    simulate,
+    walk,
 )
-from vslam_ref.features.vocabulary import Vocabulary
-from vslam_ref.support.config import assume
-from vslam_ref.systems.orbslam.recognition import RecognitionSettings
-from vslam_ref.worlds.rendered.lookalikes import overlap
+from vslam_ref.systems.orbslam.recognition_settings import RecognitionSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SIZES = ((10, 3), (8, 4), (10, 4), (10, 5))
-"""Children of a node and levels of each vocabulary."""
-SHIPPED = SIZES.index((words.BRANCHING, words.LEVELS))
 ASKED = 37
 """Revisits of 44 that are found by matching all pictures with 800 SIFT features, none wrong."""
+FOUND = 0.9
+"""Least share of the revisits of a building that are found, with a picture a metre."""
 GAIN = 2
 """Revisits that ten times the words may bring before fewer are called too few."""
 SOURCE = "A§3.1"
-
-
-@dataclass(frozen=True)
-class RecognitionConfig:
-    """Buildings of look-alikes, and what is drawn."""
-
-    runs: int = assume(5, "buildings", "enough for 'in every run'; 225 revisits")
-    seed: int = assume(300, "", "first building; others than those by which the thresholds were chosen")
-    pictures: int = assume(90, "pictures", "of two rounds: one a metre")
-
-    def __post_init__(self) -> None:
-        """Refuse what means nothing, and the buildings that chose the thresholds."""
-        if self.runs < 1 or self.pictures < 20 or self.seed < 100:
-            raise ValueError(
-                "need runs >= 1, pictures >= 20, and seed >= 100: those below chose the thresholds"
-            )
-
-
-class RecognitionRuns(NamedTuple):
-    """One building, or many, with the vocabulary that is shipped; of every picture.
-
-    Attributes
-    ----------
-    entry : ndarray of int, shape (runs, pictures)
-    support : ndarray, shape (runs, pictures)
-    accepted, right, wrong : ndarray of bool, shape (runs, pictures)
-    first : ndarray of int, shape (runs, pictures)
-    score : ndarray, shape (runs, pictures)
-    revisit : ndarray of bool, shape (runs, pictures)
-        Whether an earlier picture that counts shows the place.
-    """
-
-    entry: IntArray
-    support: Array
-    accepted: BoolArray
-    right: BoolArray
-    wrong: BoolArray
-    first: IntArray
-    score: Array
-    revisit: BoolArray
-
-
-class Walked(NamedTuple):
-    """The corridor with each vocabulary.
-
-    Attributes
-    ----------
-    sizes : list of int
-        Words of each vocabulary.
-    seen : list of SeenPictures
-    right_first : list of ndarray of bool, shape (pictures,)
-        Pictures whose highest score is that of a right one, with each vocabulary.
-    revisits : int
-    """
-
-    sizes: list[int]
-    seen: list[SeenPictures]
-    right_first: list[BoolArray]
-    revisits: int
-
-
-@cache
-def vocabulary(branching: int, levels: int) -> Vocabulary:
-    """Return a vocabulary of some size, trained as the one that is shipped."""
-    return words.trained(_pictures(), branching=branching, levels=levels)
-
-
-@cache
-def _pictures() -> list[words.PictureSource]:
-    return list(words.sources())
-
-
-def simulate(config: RecognitionConfig, point: None, seed: int) -> RecognitionRuns:
-    """One building."""
-    made = world(seed, config.pictures)
-    settings = RecognitionSettings()
-    right, wrong = truth(overlap(made))
-    given = [features(made.frame(k)) for k in range(len(made))]
-    size = SIZES[SHIPPED]
-    seen = judged_by(recognised(given, vocabulary(*size), settings, seed), right, wrong)
-    before = np.tril(right, -settings.gap - 1)
-    second = (
-        np.arange(len(made)) >= len(made) // 2
-    )  # of the first round, one end of a corridor sees the other
-    return RecognitionRuns(*seen, revisit=before.any(1) & second)
-
-
-def walk(config: RecognitionConfig) -> Walked:
-    """Recognise the corridor with vocabularies of all sizes."""
-    made = corridor.load()
-    settings = RecognitionSettings()
-    seen, sizes, right_first = [], [], []
-    for size in SIZES:
-        known = vocabulary(*size)
-        found = recognised(made.given, known, settings, config.seed)
-        seen.append(judged_by(found, made.same, ~made.same))
-        sizes.append(known.words)
-        first = found[1]
-        right_first.append(made.same[np.arange(len(first)), first] & (first >= 0))
-    return Walked(sizes, seen, right_first, int(made.same.any(1).sum()))
 
 
 # --- claims ---------------------------------------------------------------------------------------
@@ -156,7 +59,12 @@ def walk(config: RecognitionConfig) -> Walked:
 def claims(study: Study[RecognitionRuns]) -> list[Claim]:
     """Judge the corridor, the look-alikes, and what the words are worth."""
     walked: Walked = study.once
-    return [corridor_claim(walked), lookalikes_claim(study.data), words_claim(walked), enough_claim(walked)]
+    return [
+        corridor_claim(walked),
+        lookalikes_claim(study.data, study.config.pictures),
+        words_claim(walked),
+        enough_claim(walked),
+    ]
 
 
 def corridor_claim(walked: Walked) -> Claim:
@@ -175,23 +83,47 @@ def corridor_claim(walked: Walked) -> Claim:
     )
 
 
-def lookalikes_claim(data: RecognitionRuns) -> Claim:
-    """No look-alike is accepted, and nine of ten revisits are."""
-    wrong = (data.accepted & data.wrong).sum(1)
-    found = (data.accepted & data.right & data.revisit).sum(1) / np.maximum(data.revisit.sum(1), 1)
-    good = (wrong == 0) & (found >= 0.9)
+def lookalikes_claim(data: RecognitionRuns, dense: int) -> Claim:
+    """No look-alike is accepted, nine of ten revisits are; the first ``dense`` pictures are a metre apart.
+
+    Pictures side by side show the same look-alikes, so that the interval over pictures is too narrow; that
+    over buildings is not.
+    """
+    wrong, tempted = (data.accepted & data.wrong).sum(1), int(data.wrong.sum())
+    hit, asked = data.accepted & data.right & data.revisit, data.revisit
+    good = (wrong == 0) & (hit[:, :dense].sum(1) >= FOUND * asked[:, :dense].sum(1))
+    rates = {
+        "wrong": rate(int(wrong.sum()), tempted),
+        "buildings": rate(int((wrong > 0).sum()), len(wrong)),
+        "found": rate(int(hit[:, :dense].sum()), int(asked[:, :dense].sum())),
+        "found_sparse": rate(int(hit[:, dense:].sum()), int(asked[:, dense:].sum())),
+    }
+    told = {
+        name: f"{hits} of {tries} ({low:.1%} to {high:.1%})"
+        for name, (hits, tries, low, high) in rates.items()
+    }
     return judged(
         "lookalikes-are-told-apart",
         SOURCE,
         "Places that only look alike are told apart by the geometry of many parts of the picture",
-        "in every building: no accepted pair without a common scene point, and at least 90 % of the revisits "
-        "found",
+        "in every building: no accepted pair without a common scene point, with a picture a metre or one "
+        f"every two, and at least {FOUND:.0%} of the revisits found with a picture a metre",
         bool(good.all()),
-        f"In {len(wrong)} buildings {int(wrong.sum())} wrong places are accepted; of the revisits "
-        f"at least {found.min():.0%} are found in each",
-        {"wrong": wrong.tolist(), "found": found.round(3).tolist()},
+        f"Of the wrong candidates {told['wrong']} are accepted, in {told['buildings']} buildings, and of the "
+        f"revisits {told['found']} with a picture a metre, {told['found_sparse']} with one every two",
+        {"wrong_in_each": wrong.tolist(), "rates": rates},
         share=float(good.mean()),
     )
+
+
+def rate(hits: int, tries: int) -> tuple[int, int, float, float]:
+    """Hits, tries, and the ends of the 95 % interval of the share; without a try nothing is known.
+
+    >>> rate(0, 0)
+    (0, 0, 0.0, 1.0)
+    """
+    low, high = interval_of_share(hits, tries) if tries else (0.0, 1.0)
+    return hits, tries, low, high
 
 
 def precision_recall(value: Array, right: BoolArray, revisits: int) -> tuple[Array, Array]:
@@ -242,7 +174,7 @@ def words_claim(walked: Walked) -> Claim:
 def enough_claim(walked: Walked) -> Claim:
     """Ten thousand words are enough."""
     count = [int(first.sum()) for first in walked.right_first]
-    own, fewer, more = count[SHIPPED], count[0], count[-1]
+    own, fewer, more = count[SHIPPED], count[0], count[len(SIZES) - 1]
     return judged(
         "ten-thousand-words-are-enough",
         SOURCE,
@@ -251,8 +183,8 @@ def enough_claim(walked: Walked) -> Claim:
         "fewer than with the largest vocabulary",
         own >= fewer and own >= more - GAIN,
         f"With {walked.sizes[SHIPPED]} words the right picture has the highest score in {own} revisits, with "
-        f"{walked.sizes[0]} words in {fewer}, with {walked.sizes[-1]} in {more}",
-        {"words": walked.sizes, "right_first": count},
+        f"{walked.sizes[0]} words in {fewer}, with {walked.sizes[len(SIZES) - 1]} in {more}",
+        {"vocabulary": walked.names, "words": walked.sizes, "right_first": count},
     )
 
 
@@ -273,7 +205,7 @@ def series(study: Study[RecognitionRuns]) -> dict[str, object]:
     """Precision and recall by words and by support, for each size."""
     walked: Walked = study.once
     told: dict[str, object] = {"words": walked.sizes, "revisits": walked.revisits}
-    for size, seen, first in zip(walked.sizes, walked.seen, walked.right_first, strict=True):
+    for size, seen, first in zip(walked.names, walked.seen, walked.right_first, strict=True):
         told[f"score_{size}"] = precision_recall(seen.score, first, walked.revisits)
         told[f"support_{size}"] = precision_recall(seen.support, seen.right, walked.revisits)
         told[f"accepted_{size}"] = [

@@ -8,23 +8,20 @@
     for each of the best groups' best picture
       pairs under common nodes             nearest, by far, mutual, turned alike
       fundamental matrix                   inliers of the epipolar geometry, their squares, their share
-    much support, or less and the picture before recognised a place near this one
+    much support, or less and a place near this one was recognised in the picture before
 
 Two look-alikes share words, and even geometry: one door, or one poster, has as many inliers in two pictures
 of different places as in two of one.  But they crowd on that thing, and the rest of the pictures is paired by
 accident, so that the geometry explains a smaller share of the pairs.  The support of a candidate is therefore
 the number of squares of the picture that hold an inlier, times the share of the pairs that are inliers.
 
-How much is asked for was chosen on rendered look-alikes (``python -m
-vslam_ref.experiments.orbslam.lookalikes``): over sixteen buildings the most support of a wrong candidate is
-15.7, and 10.8 where the picture before agrees; the thresholds are a tenth above, rounded up.
-They are too low where pictures follow more densely: of three fresh buildings with a picture a metre, one had
-three wrong places accepted, although all 135 revisits were found.
+After a recognised place a place near it needs less, since a walk does not jump.  Two pictures that are
+doubtful alone are no more certain together: a look-alike is seen in several pictures one after the other.
+How much is asked for is chosen on rendered look-alikes: see ``recognition_settings``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +31,6 @@ from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features.vocabulary import (
     Bag,
     Database,
-    Matching,
     QueryResult,
     Vocabulary,
     bag,
@@ -44,71 +40,8 @@ from vslam_ref.features.vocabulary import (
     score,
     turned_alike,
 )
-from vslam_ref.geometry.multiview.two_views import Draws, fundamental_consensus
-
-
-@dataclass(frozen=True)
-class RecognitionSettings:
-    """How places are recognised.
-
-    Parameters
-    ----------
-    gap : int
-        The last pictures so many, which show the place anyway, are no candidates.
-    relative : float
-        Least score of a candidate, as a share of the score with the picture before.
-    common : float
-        Least number of common words, as a share of the candidate's that has most.
-    reach : int
-        Pictures so far before and after one are its neighbours.
-    group : float
-        Groups with less than this share of the best group's score are left out.
-    candidates : int
-        Most groups that are verified.
-    level : int
-        Of the nodes under which pairs are looked for; 0 is all with all.
-    matching : Matching
-    pixels : float
-        Farthest that a pair lies from the epipolar geometry, Sampson's distance, pixels.
-    square : float
-        Side of the squares by which inliers are counted, pixels; a sixteenth of the picture's width.
-    sure : float
-        Support that is enough alone, squares.
-    likely : float
-        Support that is enough if the picture before has as much with a place near this one, squares.
-    near : int
-        How many pictures apart places are near.
-    draws : Draws
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
-
-    gap: int = 8
-    relative: float = 0.3
-    common: float = 0.5
-    reach: int = 2
-    group: float = 0.5
-    candidates: int = 5
-    level: int = 0
-    matching: Matching = field(default_factory=Matching)
-    pixels: float = 3.0
-    square: float = 32.0
-    sure: float = 18.0
-    likely: float = 12.0
-    near: int = 3
-    draws: Draws = field(default_factory=lambda: Draws(confidence=0.99, least=300, most=1000, batch=100))
-
-    def __post_init__(self) -> None:
-        """Refuse settings that mean nothing."""
-        shares = (self.relative, self.common, self.group)
-        counts = (self.gap, self.reach, self.level, self.near)
-        if not all(0.0 <= share <= 1.0 for share in shares) or min(counts) < 0 or self.candidates < 1:
-            raise ValueError(f"{self}: need shares from 0 to 1, counts of at least 0, and a candidate")
-        if not (min(self.pixels, self.square) > 0 and 0 < self.likely <= self.sure):
-            raise ValueError(f"{self}: need pixels and square above 0, and 0 < likely <= sure")
+from vslam_ref.geometry.multiview.two_views import fundamental_consensus
+from vslam_ref.systems.orbslam.recognition_settings import RecognitionSettings
 
 
 class WordedPicture(NamedTuple):
@@ -281,7 +214,7 @@ class Recogniser:
         self.settings = settings or RecognitionSettings()
         self.index = Database(vocabulary.words)
         self.pictures: list[WordedPicture] = []
-        self._before = NOTHING
+        self._before = -1  # the place recognised in the picture before
 
     def see(self, uv: Array, angle: Array, descriptor: NDArray[np.uint8]) -> Recognition:
         """Recognise a picture by its features, and remember it.
@@ -307,10 +240,9 @@ class Recogniser:
         for entry in candidates.tolist():
             one = verified(now, self.pictures[entry], entry, self.rng, how)
             best = one if one.support > best.support else best
-        agreed = min(best.support, self._before.support) >= how.likely
-        agreed &= abs(best.entry - self._before.entry) <= how.near
-        accepted = best.support >= how.sure or agreed
-        self._before = best
+        follows = self._before >= 0 and abs(best.entry - self._before) <= how.near
+        accepted = best.support >= how.sure or (follows and best.support >= how.likely)
+        self._before = best.entry if accepted else -1
         self.index.add(now.bag)
         self.pictures.append(now)
-        return Recognition(best.entry if accepted else -1, best, candidates)
+        return Recognition(self._before, best, candidates)
