@@ -176,6 +176,19 @@ def test_wrong_matches_in_any_picture_change_little() -> None:
     assert found.inliers[:60].sum() <= 4
 
 
+@pytest.mark.parametrize("depth", [5e-4, 1e-6, 1e-12, -1.0])
+def test_a_point_at_a_camera_counts_as_behind_it(depth: float) -> None:
+    """Its position is beyond all numbers: it must cost much, and stop nothing."""
+    T_m = se3.exp([0.1, 0.0, -1.0, 0.0, 0.0, 0.0])
+    a = np.array([[0.1, 0.2], [0.3, -0.1]])
+    w = np.array([1.0 - depth, 0.2])  # depth in m, of one in a
+    at = three_views.ThreeViews(se3.exp([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), T_m, w, np.zeros(2))
+    now = three_views._linearised(at, a, a, a, SIGMA)
+    assert now.squared[0] == three_views.BEHIND
+    assert now.squared[1] < three_views.BEHIND
+    assert all(np.isfinite(part).all() for part in now)
+
+
 def test_too_few_points_and_bad_numbers_are_told() -> None:
     s = triple(np.random.default_rng(0), 5)
     found = ask_third(s.T_b_a[None], s.a, s.m, s.b, sigma=SIGMA)

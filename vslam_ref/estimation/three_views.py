@@ -28,6 +28,12 @@ MOST = 1e6
 """Damping at most: then no step helps."""
 BEHIND = 1e12
 """Squared distance of a point behind a camera: finite, and beyond every loss."""
+NEAREST = 1e-3
+"""Depth in another picture, over that in the first: nearer counts as behind, or C has no Cholesky factor.
+
+The derivatives of a position grow as one over this squared, so the entries of C reach 1e12: the 1 that is
+added to them still counts in sixteen digits.
+"""
 FARTHEST = 1e-4
 """Inverse depth of a point at infinity while the third pose is looked for, over the base line."""
 
@@ -129,8 +135,9 @@ def _linearised(at: ThreeViews, a: Array, m: Array, b: Array, sigma: float) -> _
         R, t = se3.rotation(T), se3.translation(T)
         turned = rays @ R.T
         y = turned + w[:, None] * t
-        valid &= y[:, 2] > 0
-        depth = np.where(y[:, 2] > 0, y[:, 2], 1.0)
+        ahead = y[:, 2] > NEAREST
+        valid &= ahead
+        depth = np.where(ahead, y[:, 2], 1.0)
         p = y[:, :2] / depth[:, None]
         error[:, rows] = p - x
         D = np.zeros((N, 2, 3))  # of p in y

@@ -42,7 +42,7 @@ class Numbered(Protocol):
         """In the sequence."""
 
 
-class Followed(Protocol):
+class FollowedPictures(Protocol):
     """What is followed from picture to picture before there is a map."""
 
     @property
@@ -52,7 +52,7 @@ class Followed(Protocol):
 
 PictureT = TypeVar("PictureT", bound=Numbered)
 MapT = TypeVar("MapT", bound=KeyframeMap)
-FollowedT = TypeVar("FollowedT", bound=Followed)
+FollowedT = TypeVar("FollowedT", bound=FollowedPictures)
 TrackerT = TypeVar("TrackerT")
 
 
