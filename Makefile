@@ -18,7 +18,7 @@ BUILD  := docs/_build
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench pair-table orb-precision vocabulary grade clean
+.PHONY: help venv reproduce test test-slow test-random test-portable twins fuzz vectors vectors-check mutants lint format notebooks notebooks-check docs docs-index bench pair-table orb-precision freak-table freak-precision vocabulary grade clean
 
 help:
 	@echo "make reproduce   redraw the paper's figures 2-4 into $(OUT)/ and judge its claims"
@@ -34,6 +34,7 @@ help:
 	@echo "make docs        build the book into $(BUILD)/html"
 	@echo "make bench       measure this machine, beside the peers that are installed"
 	@echo "make pair-table  learn the pairs of pixels that ORB compares (make orb-precision: beside OpenCV's)"
+	@echo "make freak-table learn the pairs of fields that FREAK compares (make freak-precision: beside contrib's)"
 	@echo "make vocabulary  train the vocabulary of ORB's words that comes with the package"
 	@echo "make grade EXERCISE=16_name FILE=mine.py   grade an answer"
 	@echo "make clean       remove everything that was made"
@@ -98,6 +99,12 @@ vocabulary: $(call DONE,fast)
 
 orb-precision: $(call DONE,fast) $(call DONE,test)
 	$(ONE_THREAD) $(PY) tests/orb/precision.py
+
+freak-table: $(call DONE,fast)
+	$(ONE_THREAD) $(PY) -m vslam_ref.experiments.freak.learned_pairs
+
+freak-precision: $(call DONE,fast) $(call DONE,test)
+	$(ONE_THREAD) $(PY) tests/freak/precision.py
 
 grade: $(call DONE,fast) $(call DONE,test)
 	@test -n "$(EXERCISE)" && test -n "$(FILE)" || { echo "say: make grade EXERCISE=16_name FILE=mine.py" >&2; exit 2; }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vslam_ref.bench import features, orb
+from vslam_ref.bench import features, freak, orb
 from vslam_ref.features import hamming
 from vslam_ref.features.orb import extract
 
@@ -41,4 +41,11 @@ def test_orb_is_measured_beside_opencv() -> None:
     assert len(extract(image).uv) == orb.FEATURES
     rows = orb.measure_hamming("numpy", quick=True) + orb.measure_extraction("wall", image, "numpy", True)
     assert [r["goal"] for r in rows] == ["FE-3"] * 3 + ["ORB"] * 3
+    assert all(r["value"] > 0 for r in rows)
+
+
+def test_freak_is_measured_beside_opencvs_orb() -> None:
+    image = features.images()["wall"][1]
+    rows = freak.measure_description("wall", image, "numpy", True)
+    assert [r["goal"] for r in rows] == ["FREAK", "FREAK"]
     assert all(r["value"] > 0 for r in rows)

@@ -30,6 +30,7 @@ from vslam_ref.grids.static_dynamic import Layers, Rules
 from . import (
     rows_bundle,
     rows_features,
+    rows_freak,
     rows_orb,
     rows_orbslam,
     rows_pose,
@@ -182,6 +183,7 @@ INPUTS: dict[str, list[Callable[[Rng, int, int], tuple[Any, ...]]]] = {
     "reduced:reduced_update_in_place": [for_reduced_update],
     **rows_bundle.ROWS,
     **rows_features.ROWS,
+    **rows_freak.ROWS,
     **rows_orb.ROWS,
     **rows_orbslam.ROWS,
     **rows_pose.ROWS,

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array
-from vslam_ref.bench import orb
+from vslam_ref.bench import freak, orb
 from vslam_ref.bench.rows import Row, measured, on_each_backend, row
 from vslam_ref.datasets import catalogue, pictures
 from vslam_ref.features import (
@@ -72,7 +72,12 @@ def run(quick: bool = False) -> dict[str, Any]:
             r for name, pair in pairs.items() for r in orb.measure_extraction(name, pair[1], backend, quick)
         ]
 
-    rows = measured("features", on_each_backend(quick, all_pairs, orb.measure_hamming, orb_features))
+    def freak_points(backend: str, quick: bool) -> list[Row]:
+        found = [freak.measure_description(name, pair[1], backend, quick) for name, pair in pairs.items()]
+        return [r for part in found for r in part]
+
+    parts = (all_pairs, orb.measure_hamming, orb_features, freak_points)
+    rows = measured("features", on_each_backend(quick, *parts))
     return {"rows": rows, "threads": 1, "peer": f"OpenCV {cv2.__version__}"}
 
 

@@ -11,7 +11,9 @@ module              holds
 ``refinement``      between the pixels: inverse compositional, with an offset of brightness
 ``following``       points from image to image, and back as a check
 ``hamming``         binary descriptors: bits that differ, and pairs
+``guided``          pairs near predicted places
 ``orb``             corners of all scales with a direction and 256 bits each
+``freak``           512 bits of key points of any scale, from 43 fields like a retina's
 ``small_images``    a tiny blurred image, and how the camera turned between two of them
 ``book``            the same in plain loops, as chapter 08 reads it
 ==================  =================================================================================

@@ -111,21 +111,58 @@ def learn(patch: Bytes, candidate: IntArray, wanted: int = 256) -> LearnedPairs:
         raise ValueError(
             f"{len(candidate)} candidates and {len(patch)} patches: need {wanted} candidates and 2 patches"
         )
-    packed, count = _bits(patch, candidate)
-    order = np.argsort(np.abs(2 * count - len(patch)), kind="stable")
-    packed, count, candidate = packed[order], count[order], candidate[order]
-    known: dict[int, Array] = {}
-    limit, taken = FIRST_LIMIT, _greedy(packed, count, len(patch), FIRST_LIMIT, wanted, known)
-    while len(taken) < wanted:
-        limit = round(limit + STEP, 2)
-        taken = _greedy(packed, count, len(patch), limit, wanted, known)
+    taken, limit, mean = choose(patch, candidate, wanted)
     chosen = candidate[taken]
-    return LearnedPairs(
-        np.concatenate([GRID[chosen[:, 0]], GRID[chosen[:, 1]]], 1), limit, count[taken] / len(patch)
-    )
+    return LearnedPairs(np.concatenate([GRID[chosen[:, 0]], GRID[chosen[:, 1]]], 1), limit, mean)
 
 
-def _bits(patch: Bytes, candidate: IntArray) -> tuple[Words, IntArray]:
+def choose(value: Bytes | Array, candidate: IntArray, wanted: int) -> tuple[IntArray, float, Array]:
+    """Choose comparisons of values (n, k), grey levels, by the rule of ORB.
+
+    Implements :eq:`eq-orb-learn`.
+
+    Parameters
+    ----------
+    value : ndarray, shape (n, k)
+        Of any unit.
+    candidate : ndarray of int64, shape (m, 2)
+        Pairs of columns; a comparison is true where the first is the smaller.
+    wanted : int
+
+    Returns
+    -------
+    taken : ndarray of int64, shape (wanted,)
+        Numbers of candidates, in the order in which they were taken.
+    limit : float
+        The limit of the correlation that let enough pass.
+    mean : ndarray, shape (wanted,)
+        Share of the n for which each is true.
+
+    Raises
+    ------
+    ValueError
+        If fewer candidates than wanted are ever true and ever false and differ from each other.
+
+    Examples
+    --------
+    >>> value = np.random.default_rng(0).normal(size=(500, 9))
+    >>> choose(value, np.array([[0, 1], [2, 3], [4, 5]]), 2)[1]
+    0.2
+    """
+    packed, count = _bits(value, candidate)
+    order = np.argsort(np.abs(2 * count - len(value)), kind="stable")
+    packed, count = packed[order], count[order]
+    known: dict[int, Array] = {}
+    limit, taken = FIRST_LIMIT, _greedy(packed, count, len(value), FIRST_LIMIT, wanted, known)
+    while len(taken) < wanted:
+        if limit > 1:
+            raise ValueError(f"{len(taken)} comparisons tell values apart: need {wanted}")
+        limit = round(limit + STEP, 2)
+        taken = _greedy(packed, count, len(value), limit, wanted, known)
+    return order[taken], limit, count[taken] / len(value)
+
+
+def _bits(patch: Bytes | Array, candidate: IntArray) -> tuple[Words, IntArray]:
     """Answers of all candidates, packed as words of 64 patches (m, words), and how often each is true."""
     pixel = np.ascontiguousarray(patch.T)
     found = []
