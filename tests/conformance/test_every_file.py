@@ -13,7 +13,7 @@ from vslam_ref.conformance.runner import run
 
 FILES = form.names()
 MOST_BYTES = 500_000
-"""A file is opened in an editor and its changes are read line by line; a topic that outgrows this is split."""
+"""A file is opened in an editor, and its changes are read line by line; a larger topic is split."""
 
 
 @pytest.mark.parametrize("name", FILES)
