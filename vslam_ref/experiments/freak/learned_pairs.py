@@ -21,8 +21,9 @@ from vslam_ref.features.freak import learning
 from vslam_ref.features.levels import Bytes
 from vslam_ref.features.orb import OrbSettings
 from vslam_ref.support.files import write_text
-from vslam_ref.worlds.rendered import NAMES, scene
+from vslam_ref.worlds.rendered import scene
 
+SCENES = ("desk", "corridor", "rotation", "building")
 SCENE_SEEDS, PER_SCENE = (101, 102, 103), 4
 PER_PICTURE = OrbSettings(features=400)
 TARGET = Path(learning.__file__).with_name("pair_table.py")
@@ -31,7 +32,7 @@ COMMAND = "python -m vslam_ref.experiments.freak.learned_pairs"
 
 def pictures() -> Iterator[Bytes]:
     """Yield the rendered pictures from which is learned."""
-    for name in NAMES:
+    for name in SCENES:
         for seed in SCENE_SEEDS:
             made = scene(name, seed)
             for k in range(PER_SCENE):
@@ -50,7 +51,7 @@ def table() -> str:
     return HEAD.format(
         command=COMMAND,
         pictures=len(found),
-        scenes=", ".join(NAMES),
+        scenes=", ".join(SCENES),
         seeds=", ".join(map(str, SCENE_SEEDS)),
         digest=digest.hexdigest()[:32],
         points=len(mean),
