@@ -70,6 +70,13 @@ def test_the_table_is_the_one_that_was_learned() -> None:
     assert digest in (pair_table.__doc__ or "")
 
 
+def test_the_table_does_not_go_from_coarse_to_fine() -> None:
+    """What the docstring of ``learning`` says of its four quarters; going to fine, they would rise."""
+    ring = np.minimum(PAIRS // 6, 7).reshape(4, 256).mean(1)
+    assert ring.round(1).tolist() == [2.7, 2.7, 2.6, 2.9]
+    assert f"{ring[0]:.1f}, {ring[1]:.1f}, {ring[2]:.1f} and {ring[3]:.1f}" in (learning.__doc__ or "")
+
+
 @pytest.mark.slow
 def test_the_command_makes_the_table_again() -> None:
     """Byte for byte, from rendered scenes: a minute."""

@@ -3,7 +3,8 @@
 A row for each key point, a column for each pair; columns are sorted by the distance of their mean from one
 half, for then their variance is highest; the best is kept, and from the others, in this order, each whose
 correlation with all that are kept is below a limit.  The limit rises until enough are kept.  No pair of rings
-is favoured: that the paper's pairs go from coarse to fine is a finding, and this table is asked for it, too.
+is favoured.  The paper finds that its pairs then go from coarse to fine.  The table learned here does not:
+the mean ring of its fields, 0 the outermost, is 2.7, 2.7, 2.6 and 2.9 in its four quarters.
 """
 
 from __future__ import annotations
