@@ -168,7 +168,7 @@ def test_process_noise_in_a_single_update_is_named_also_beside_another_error() -
 
     for beside in ("", "the mean is off"):
         name = named("ekf.update", lambda beside=beside, **given: update(beside, **given))
-        assert "process noise is taken for sensor noise" in name
+        assert "process noise as sensor noise" in name
 
 
 def test_rounding_is_called_rounding() -> None:

@@ -204,7 +204,7 @@ SECOND = [
     Wrong("ekf.predict", F, "after = F.T @ P @ F + noise if wrong == \"gtpg\" else F @ P @ F.T + noise", "after = F @ P + noise", "P|transposed|nothing"),
     Wrong("ekf.predict", F, "x[:3] += [ds * c, ds * s, turn]", "x[:3] += [ds * c, ds * s, -turn]", "entry 2 of x|minus|other sign"),
     Wrong("ekf.update", F, "P - K @ S @ K.T\n    if wrong == \"pose-only\"", "P + K @ S @ K.T\n    if wrong == \"pose-only\"", "sign|only P"),
-    Wrong("ekf.update", F, "S = H @ P @ H.T + block_diag(*[cov_z] * len(ids))", "S = H @ P @ H.T + block_diag(*[cov_z + np.diag([0.09, 0.0025])] * len(ids))", "process noise is taken for sensor noise"),
+    Wrong("ekf.update", F, "S = H @ P @ H.T + block_diag(*[cov_z] * len(ids))", "S = H @ P @ H.T + block_diag(*[cov_z + np.diag([0.09, 0.0025])] * len(ids))", "process noise as sensor noise"),
     Wrong("ekf.update", F, "H[2 * k : 2 * k + 2, :3] = np.column_stack([-A, slope])", "H[2 * k : 2 * k + 2, :3] = np.column_stack([A, slope])", "column|sighting's Jacobian|-J_landmark"),
     Wrong("ekf.augment", F, "own, cross = G @ P @ G.T + R @ cov_z @ R.T, G @ P", "own, cross = G @ P @ G.T, G @ P", "cov_z is left out"),
     Wrong("ekf.augment", F, "np.concatenate([x, x[:2] + turned])", "np.concatenate([x, turned])", "only .*x|alone"),

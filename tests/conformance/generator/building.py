@@ -23,7 +23,6 @@ CHANGED = {
         "0.2.0",  # regimes filled: every size, special values, sizes of maps; digits that may be lost
     ),
     **dict.fromkeys(("se2", "camera", "bundle", "vehicle", "grid"), "0.2.1"),  # a few regimes and notes more
-    **dict.fromkeys(("multiview", "least_squares", "ekf"), "0.2.1"),  # refusals, rows of refusals, symmetry
 }
 """Topic -> its version, where its numbers have changed since VERSION."""
 FORMAT = 1

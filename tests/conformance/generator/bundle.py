@@ -36,7 +36,7 @@ NOTES = {
         "you weigh all with one covariance: each observation has its own (A2.9 as printed lost the index i)",
         "1/2 sum e^T cov_0^-1 e",
     ),
-    "covariance-ignored": ("you ignore the covariances", "1/2 sum e^T e"),
+    "covariance-ignored": ("your cost ignores the covariances", "1/2 sum e^T e"),
     "right-perturbation": ("your pose is perturbed on the right, T Exp(xi)", "M^T B M with M = Ad(T)"),
     "gradient-sign": (
         "your gradients have the wrong sign: residuals are predicted minus measured",

@@ -44,7 +44,7 @@ NOTES = {
     "heading-not-wrapped": ("your heading error leaves (-pi, pi]", "truth - estimate"),
     "estimate-minus-truth": ("your error has the other sign: estimate minus truth", "estimate - truth"),
     "one-run": (
-        "your band, or bound, is that of one run; the mean of M runs has M d degrees of freedom",
+        "your band is that of one run; the mean of M runs has M d degrees of freedom",
         "chi2_d quantiles",
     ),
     "not-divided": (

@@ -60,15 +60,6 @@ NOTES = {
         " all sightings at once were asked for",
         "an update for each row of z",
     ),
-    "one-triangle": (
-        "your update fills the upper triangle of P and leaves the lower as it was: P is not symmetric",
-        "P_ij of after for i <= j, of before for i > j",
-    ),
-    "rows-only": (
-        "your update corrects the rows of the pose and of the landmarks seen, not their columns:"
-        " P is not symmetric",
-        "rows of P - K S K^T; the other rows of P as before",
-    ),
     "pose-only": ("your update corrects the pose and leaves the map as it was", "x_m, P_pm, P_mm unchanged"),
     "identity-landmark": (
         "your new landmark has identity covariance and no cross covariances",
@@ -118,7 +109,6 @@ def build(rng: np.random.Generator) -> Topic:
     ekf_sizes.new_landmarks(topic, rng, tolerance(6e-14, BIG_MAP))
     ekf_others.additive(topic, rng)
     ekf_others.gates(topic, rng)
-    ekf_sizes.symmetric_updates(topic, rng.spawn(1)[0], tolerance(2e-11, BIG_UPDATE))
     return topic
 
 

@@ -96,10 +96,6 @@ def update(x: Big, P: Big, slots: Sequence[int], z: Big, cov_z: Big, *, wrong: s
     kept = P - K @ S @ K.T
     if wrong == "pose-only":
         after, kept = stack([*after[:3], *x[3:]]), _pose_only(P, kept)
-    if wrong == "one-triangle":
-        kept = np.triu(kept) + np.tril(P, -1)
-    if wrong == "rows-only":
-        kept = _rows_only(P, kept, slots)
     return (after if wrong == "heading-not-wrapped" else wrapped(after)), kept
 
 
@@ -107,14 +103,6 @@ def _pose_only(P: Big, kept: Big) -> Big:
     """The old covariance with the new one of the pose."""
     out = P.copy()
     out[:3, :3] = kept[:3, :3]
-    return out
-
-
-def _rows_only(P: Big, kept: Big, slots: Sequence[int]) -> Big:
-    """The old covariance with the new rows of the pose and of the landmarks that were seen."""
-    out = P.copy()
-    rows = [0, 1, 2, *(3 + 2 * slot + k for slot in slots for k in (0, 1))]
-    out[rows] = kept[rows]
     return out
 
 

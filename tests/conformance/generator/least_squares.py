@@ -34,10 +34,6 @@ NOTES = {
         "your damping doubles after each refused step; it must grow by 2, 4, 8 in a row",
         "lambda <- 2 lambda",
     ),
-    "growth-not-reset": (
-        "your growth goes on after a step was taken; each new row of refusals starts at 2",
-        "nu stays 4, 8, ... after a step",
-    ),
     "factor-not-cubed": ("you square where Nielsen takes the cube", "max(1/3, 1 - (2 gain - 1)^2)"),
     "always-taken": ("you take a step although the cost rises", "b <- b + step, always"),
     "cost-not-halved": ("your cost is |r|^2; it is half of it", "|r|^2"),

@@ -20,7 +20,7 @@ ROUNDING = "a hundred operations on numbers of order 1 within eps, as in a gener
 
 NOTES = {
     "straight": (
-        "you copy the translation between pose and tangent vector: the turn bends it, t = V rho",
+        "your exponential copies the translation: it must be bent by the turn, t = V rho",
         "(rho, theta)",
     ),
     "right-jacobian": ("your left Jacobian is the right one", "J(-xi)"),

@@ -31,10 +31,10 @@ ROUNDING = "a hundred operations on numbers of order 1 within eps, as in a gener
 
 NOTES = {
     "straight": (
-        "you copy the translation between motion and tangent vector: the screw bends it, t = V rho",
+        "your exponential copies the translation: the screw bends it, t = V rho",
         "[[Exp(phi), rho], [0, 1]]",
     ),
-    "right-jacobian": ("your left Jacobian, or its inverse, is the right one", "J(-xi)"),
+    "right-jacobian": ("your left Jacobian is the right one", "J(-xi)"),
     "small-angle-sign": (
         "your branch for small angles has the sign of the right Jacobian",
         "I - ad(xi)/2 for I + ad(xi)/2",

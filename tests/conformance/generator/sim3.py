@@ -22,10 +22,10 @@ SERIES = "power series of the generator, 50 digits"
 
 NOTES = {
     "rigid-translation": (
-        "you take V of the rigid motion: the growing scale bends the translation, too",
+        "your translation is that of the rigid motion: the growing scale bends it, too",
         "t = V(phi) rho for t = W(phi, sigma) rho",
     ),
-    "straight": ("you copy the translation between similarity and tangent vector: t = V rho", "t = rho"),
+    "straight": ("your exponential copies the translation", "t = rho"),
     "inverse-not-scaled": ("the translation of your inverse is not divided by the scale", "t' = -R^T t"),
     "inverse-scaled-up": ("the translation of your inverse is multiplied by the scale", "t' = -s R^T t"),
     "translation-scaled": ("your action scales the translation as well", "s (R x + t)"),

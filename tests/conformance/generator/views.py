@@ -145,26 +145,10 @@ def pose_groups(topic: Topic, rng: np.random.Generator) -> None:
         topic.group(
             "multiview.pnp", "eq-resection-refined", oracle, rule, [c for c, _ in made], flags=(flag,)
         )
-    _no_pose(topic, rng.spawn(1)[0])
     rule = tolerance(1e-9, "roots of a quartic that lie a hundredth apart at least, times eps", float32=5e-2)
     oracle = "all roots of Grunert's quartic, 50 digits"
     cases = [_three(rng) for _ in range(16)]
     topic.group("multiview.p3p", "eq-p3p-distances", oracle, rule, cases)
-
-
-def _no_pose(topic: Topic, rng: np.random.Generator) -> None:
-    """Points that leave the pose open: too few, all on one line, all at one place."""
-    params = sensor(rng)
-    T = looking(rng, np.array([1.0, -2.0, -5.5]), rng.uniform(-0.3, 0.3, 3))
-    free, line = rng.uniform(-1.0, 1.0, (3, 3)), np.outer(np.linspace(-1.0, 1.0, 6), rng.uniform(0.3, 0.8, 3))
-    cases = []
-    for X in (free, free[:2], line, line[:4], np.tile(free[0], (5, 1))):
-        uv = [floats(pixel(vector(params), in_camera(T, x))) for x in X]
-        inputs = {"params": params, "X_world": X, "uv": np.array(uv)}
-        cases.append({"inputs": inputs, "expected": {}, "result": "invalid"})
-    rule = tolerance(0.0, "nothing is compared", absolute=1e-9)
-    oracle = "definition: a turn about the line, or three of the six numbers, change no pixel"
-    topic.group("multiview.pnp", "eq-resection-refined", oracle, rule, cases, flags="degenerate")
 
 
 def _pnp(rng: np.random.Generator, n: int, *, planar: bool) -> tuple[dict[str, Any], float]:

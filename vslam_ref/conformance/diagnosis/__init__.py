@@ -9,7 +9,6 @@
     single   notes, then turns       |  declared    another convention, asked again
                                      |  formulas    well-known wrong formulas
                                      |  turns       the answer turned back
-                                     |  scales      the answer times a number of the question
                                      |  changes     an input turned, exchanged, left out
                                      |  shifts      an input off by one or a half, rows moved
                                      |  one_change  the library with one sign changed

@@ -27,10 +27,6 @@ MOST = 0.5
 """A name explains more than this share of the failures."""
 CARRYING = 2
 """Failures that carry a known mistake, at least: each mistake stands in some cases only."""
-UNTOLD = 0.2
-"""Share of the failures of which a wrong formula may say nothing: its question is none there."""
-WHOLE = 3
-"""Cases with a known mistake that are needed where all answers are whole numbers."""
 FEW = 5
 """Of so few failures one is enough: the cases of such functions are long."""
 NEARER = 0.1
@@ -168,25 +164,10 @@ def mostly(evidence: Evidence, repair: Guess) -> Test:
 def carried(evidence: Evidence, note: Guess) -> Test:
     """Test a known mistake, whose answer only some cases carry: as :func:`predicts`, by these cases alone."""
     those = [seen for seen in evidence.failed if note(seen.case, seen.got)]
-    if len(those) < (1 if len(evidence.failed) <= FEW else CARRYING) or thin(those):
+    if len(those) < (1 if len(evidence.failed) <= FEW else CARRYING):
         return NO
     found = predicts(evidence._replace(failed=those), note)
-    most = len(those) > MOST * len(evidence.failed)
-    return found._replace(explained=len(evidence.failed)) if most and found is not NO else found
-
-
-def thin(seen: list[AnsweredCase]) -> bool:
-    """Whether right answers are a few whole numbers or words: another mistake may give the same wrong ones."""
-    values = [array(value) for one in seen for value in one.case.expected.values()]
-    numbers = np.concatenate([v.ravel() for v in values if v is not None] or [np.zeros(0)])
-    broken = np.isfinite(numbers) & (numbers != np.round(numbers))
-    return not broken.any() and len(seen) < WHOLE
-
-
-def covers(evidence: Evidence, guess: Guess) -> Test:
-    """As :func:`predicts`, for a formula that says something of nearly all failures."""
-    found = predicts(evidence, guess)
-    return found if found.explained >= (1 - UNTOLD) * len(evidence.failed) else NO
+    return found if found is NO else found._replace(explained=len(evidence.failed))
 
 
 def predicts(evidence: Evidence, formula: Guess) -> Test:

@@ -12,7 +12,6 @@ from vslam_ref.conformance.diagnosis import places, sizes
 from vslam_ref.conformance.diagnosis.changes import echoes, lost, undone
 from vslam_ref.conformance.diagnosis.declared import declared
 from vslam_ref.conformance.diagnosis.evidence import (
-    MOST,
     AnsweredCase,
     Ask,
     Evidence,
@@ -21,18 +20,17 @@ from vslam_ref.conformance.diagnosis.evidence import (
     agrees,
     array,
     carried,
-    covers,
     gather,
     mostly,
+    predicts,
     repairs,
 )
 from vslam_ref.conformance.diagnosis.filters import added_noise, spoiled
 from vslam_ref.conformance.diagnosis.formulas import formulas
 from vslam_ref.conformance.diagnosis.notes import noted, random_note
 from vslam_ref.conformance.diagnosis.one_change import lines_of, one_change
-from vslam_ref.conformance.diagnosis.scales import scaled
 from vslam_ref.conformance.diagnosis.shifts import shifted
-from vslam_ref.conformance.diagnosis.turns import forward, turns
+from vslam_ref.conformance.diagnosis.turns import forward, scaled, turns
 from vslam_ref.conformance.results import NOTHING, Outcome
 
 FEW_PASS = 0.25
@@ -54,16 +52,16 @@ class Family(NamedTuple):
 FAMILIES = (
     Family(noted, carried),
     Family(declared, mostly),
-    Family(formulas, covers),
-    Family(spoiled, covers),
-    Family(echoes, covers),
+    Family(formulas, predicts),
+    Family(spoiled, predicts),
+    Family(echoes, predicts),
     Family(turns, repairs),
-    Family(forward, covers),
+    Family(forward, predicts),
     Family(scaled, repairs),
     Family(undone, repairs),
-    Family(lost, covers),
-    Family(shifted, covers),
-    Family(one_change, covers),
+    Family(lost, predicts),
+    Family(shifted, predicts),
+    Family(one_change, predicts),
 )
 """In this order; the first name that fits is taken."""
 
@@ -117,13 +115,8 @@ def _main(evidence: Evidence) -> str:
         return odd
     if part:
         return part
-    found = sizes.digits(evidence) or _place(evidence)
-    skew = places.asymmetric(evidence)
-    return f"{found or NOTHING}; {skew}" if skew else found
-
-
-def _place(evidence: Evidence) -> str:
-    """Which cases and which entries are wrong, where nothing explains them."""
+    if found := sizes.digits(evidence):
+        return found
     place, entry = places.where(evidence), places.entries(evidence)
     if place and len(evidence.passed) < FEW_PASS * len(evidence.failed) and not entry:
         return f"{NOTHING}; wrong: {place}"
@@ -141,9 +134,7 @@ def _searched(evidence: Evidence) -> tuple[str, str]:
                 if family.guesses is not declared:  # a convention holds in all cases, or it is none
                     partly = partly or _part(evidence, sentence, count, against)
                 continue
-            if 0 < count <= MOST * len(evidence.failed):
-                partly = partly or f"in {count} of {len(evidence.failed)} failures {sentence}"
-            elif count > most:
+            if count > most:
                 best, most = sentence, count
             if count and count >= len(evidence.failed):
                 return sentence, ""

@@ -9,9 +9,6 @@ from vslam_ref.conformance.results import Outcome
 from vslam_ref.conformance.statistics import mistaken
 from vslam_ref.conformance.vectors_format import Case
 
-MEASURES = 2
-"""Different measures of a distribution that a name needs: many wrong ones share one."""
-
 
 def noted(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
     """Notes of the failed cases, those that most of them carry first."""
@@ -40,20 +37,10 @@ def random_note(evidence: Evidence) -> Iterator[str]:
     notes = {note for o in evidence.random for note in (o.case.statistic or {}).get("mistakes", {})}
     for note in sorted(notes):
         if _agreed(evidence.random, note):
-            yield _worded(evidence, note)
+            yield f"{note}: {evidence.file.notes[note]['meaning']}"
             return
     measures = sorted({str((o.case.statistic or {}).get("measure")) for o in bad})
     yield f"the distribution is off in {' and '.join(measures)}"
-
-
-def _worded(evidence: Evidence, note: str) -> str:
-    """A name where two measures agree; of one it can only be said that this mistake gives it, too."""
-    told = f"{note}: {evidence.file.notes[note]['meaning']}"
-    rules = [o.case.statistic or {} for o in evidence.random]
-    measures = {str(rule["measure"]) for rule in rules if note in rule.get("mistakes", {})}
-    if len(measures) >= MEASURES:
-        return told
-    return f"the distribution is off in {measures.pop()}, as by this mistake, or another: {told}"
 
 
 def _agreed(random: list[Outcome], note: str) -> bool:

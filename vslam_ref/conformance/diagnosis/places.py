@@ -15,13 +15,9 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.evidence import AnsweredCase, Evidence, array
-from vslam_ref.conformance.diagnosis.scales import numbers_of
-from vslam_ref.conformance.diagnosis.turns import both
-from vslam_ref.conformance.diagnosis.words import places
+from vslam_ref.conformance.diagnosis.turns import both, numbers_of, places
 from vslam_ref.conformance.vectors_format import Case
 
-SYMMETRIC = 1e-12
-"""Two sums in another order differ by less, over the largest entry: some thousand roundings."""
 FEWEST = 3
 """Cases that a range needs on either side."""
 
@@ -147,25 +143,6 @@ def _how(evidence: Evidence, name: str, wrong: Array) -> str:
             ", of the other sign," if abs(ratio[0] + 1) < 1e-6 else f", {ratio[0]:.6g} times the right value,"
         )
     return ""
-
-
-def asymmetric(evidence: Evidence) -> str:
-    """A matrix that is symmetric in all right answers, and in no wrong one."""
-    for name in evidence.function.outputs:
-        found = both(evidence, name, 60)
-        square = [(w, h) for w, h in found if w.ndim >= 2 and w.shape[-1] == w.shape[-2] > 1]
-        if not square or len(square) < len(found) or any(_skew(w) > SYMMETRIC for w, _ in square):
-            continue
-        sizes = [_skew(h) for _, h in square]
-        if all(size > SYMMETRIC for size in sizes):
-            far = f"{max(sizes):.1e} of the largest"
-            return f"{name} is not symmetric: an entry and its mirror image differ by up to {far}"
-    return ""
-
-
-def _skew(x: Array) -> float:
-    """Largest difference of an entry and its mirror image, over the largest entry."""
-    return float(np.abs(x - np.swapaxes(x, -1, -2)).max() / (np.abs(x).max() or 1.0))
 
 
 def shape(evidence: Evidence) -> str:

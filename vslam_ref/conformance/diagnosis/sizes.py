@@ -13,8 +13,6 @@ from vslam_ref.conformance.diagnosis.places import where
 
 ROUNDING = 1e-13
 """Differences, to numbers of order 1, that need no wrong formula."""
-SINGLE = 4
-"""Numbers of long single precision that are needed: one of double precision is one by chance in 2^29."""
 ENOUGH = 3.0
 """Digits from which an answer counts as right with digits lost."""
 
@@ -80,10 +78,8 @@ def single(evidence: Evidence) -> str:
         _numbers(seen.got for seen in evidence.failed),
         _numbers(seen.case.expected for seen in evidence.failed),
     )
-    if not have.size or not want.size or not _is_single(have) or _is_single(want):
+    if have.size <= ENOUGH or want.size <= ENOUGH or not _is_single(have) or _is_single(want):
         return ""
-    if np.count_nonzero(_long(have)) < SINGLE or any(error(seen) > 10**-ENOUGH for seen in evidence.failed):
-        return ""  # multiples of a quarter are of 32 bits, too; and what is far off has another fault beside
     return "single precision: every number of the answers is one of 32 bits"
 
 
@@ -92,12 +88,6 @@ def _numbers(answers: Iterable[Answer]) -> Array:
     values = [array(value) for answer in answers for value in answer.values()]
     x = np.concatenate([v.ravel() for v in values if v is not None] or [np.zeros(0)])
     return np.asarray(x[np.isfinite(x) & (x != np.round(x))])
-
-
-def _long(x: Array) -> Array:
-    """Which numbers need more than half of the 24 bits of single precision."""
-    mantissa = np.frexp(x)[0] * 2.0**12
-    return np.asarray(mantissa != np.round(mantissa))
 
 
 def _is_single(x: Array) -> bool:

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Answers turned back: a sign, a transpose, an order, a unit, a factor, signs of entries.
 
 Each is a repair: it turns a wrong answer into the right one, for every case of a function in the same way.
@@ -14,7 +15,6 @@ import numpy as np
 
 from vslam_ref.arrays import Array
 from vslam_ref.conformance.diagnosis.evidence import Answer, Evidence, Guess, array, spread
-from vslam_ref.conformance.diagnosis.words import called, in_order, in_short, places
 from vslam_ref.conformance.vectors_format import Case
 
 TURNS: dict[str, Callable[[Array], Any]] = {
@@ -54,13 +54,6 @@ TURNS: dict[str, Callable[[Array], Any]] = {
     "not of unit length": lambda x: x / np.linalg.norm(x, axis=-1, keepdims=True),
     "not a rotation by its scale": lambda x: x / np.cbrt(np.linalg.det(x))[..., None, None],
     "the rows come one after another, not as a matrix": lambda x: x.reshape(int(x.size**0.5), -1),
-    "it is not symmetric: the upper triangle is right": lambda x: (
-        np.triu(x) + np.swapaxes(np.triu(x, 1), -1, -2)
-    ),
-    "it is not symmetric: the lower triangle is right": lambda x: (
-        np.tril(x) + np.swapaxes(np.tril(x, -1), -1, -2)
-    ),
-    "it is not symmetric: a skew part is added": lambda x: (x + np.swapaxes(x, -1, -2)) / 2,
     "it stands in a list of its own": lambda x: x[0] if x.shape[:1] == (1,) else x[:0],
     "it is a column": lambda x: x[..., 0] if x.shape[-1:] == (1,) else x[:0],
     "truth is taken for falsehood": lambda x: np.where((x == 0) | (x == 1), 1 - x, np.nan),
@@ -83,11 +76,6 @@ def _short_way(x: Array) -> Array:
     if x.shape != (3,) or size <= np.pi:
         raise ValueError("no long way")
     return x * (1 - 2 * np.pi / size)
-
-
-def _mirrored(triangle: Array) -> Array:
-    both_sides = triangle + np.swapaxes(triangle, -1, -2)
-    return np.asarray(both_sides - triangle * np.eye(triangle.shape[-1]))
 
 
 def _four(x: Array) -> Array:
@@ -161,7 +149,7 @@ def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[A
     if ratios.size and np.ptp(ratios) < 1e-6 * abs(ratios[0]):
         factor = float(np.median(ratios))
         if len(pairs) > 1 and abs(factor - 1) > 1e-9:
-            yield f"a constant factor: {called(1 / factor)} times the right value", lambda x: factor * x
+            yield f"a constant factor: {_called(1 / factor)} times the right value", lambda x: factor * x
     shapes = {w.shape for w, _ in pairs}
     if len(shapes) != 1 or len(pairs) < 2:
         return
@@ -170,7 +158,7 @@ def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[A
     offset = (want - have).mean(axis=0)
     scale = np.abs(want).max()
     if np.abs(want - have - offset).max() < 1e-9 * scale and np.abs(offset).max() > 1e-6 * scale:
-        yield f"a constant is added: {in_short(-offset)}", lambda x: x + offset
+        yield f"a constant is added: {_short(-offset)}", lambda x: x + offset
     same, other = (np.abs(want - s * have).max(axis=0) < 1e-6 * scale for s in (1, -1))
     if (same | other).all() and not same.all():
         signs = np.where(same, 1.0, -1.0)
@@ -178,7 +166,7 @@ def _fitted(pairs: list[tuple[Array, Array]]) -> Iterator[tuple[str, Callable[[A
     if shape in ((2,), (3,), (4,)):
         for order in permutations(range(shape[0])):
             if list(order) != sorted(order):
-                yield f"the numbers are in another order: {in_order(order)}", _ordered(order)
+                yield f"the numbers are in another order: {_order(order)}", _ordered(order)
 
 
 def _ordered(order: tuple[int, ...]) -> Callable[[Array], Any]:
@@ -223,3 +211,117 @@ def _made(name: str, change: Callable[[Array], Any]) -> Guess:
             return None
 
     return formula
+
+
+POWERS = {1.0: "multiplied by {}", -1.0: "divided by {}", 2.0: "multiplied by {}^2", -2.0: "divided by {}^2", 0.5: "multiplied by the root of {}", -0.5: "divided by the root of {}"}  # fmt: skip
+
+
+def scaled(evidence: Evidence) -> Iterator[tuple[str, Guess]]:
+    """Repairs: an output divided or multiplied by a number of the inputs, or by how many there are."""
+    rows = [dict(numbers_of(seen.case)) for seen in spread(evidence.failed, 12)]
+    for name in evidence.function.outputs:
+        head = f"{name}: " if len(evidence.function.outputs) > 1 else ""
+        pairs = both(evidence, name)
+        ratios = np.array([np.vdot(w, h) / np.vdot(w, w) if np.vdot(w, w) > 0 else np.nan for w, h in pairs])
+        if (
+            len(pairs) != len(rows)
+            or len(pairs) < 3
+            or not np.isfinite(ratios).all()
+            or np.ptp(ratios) < 1e-9
+        ):
+            continue
+        for feature in rows[0]:
+            values = np.array([row.get(feature, np.nan) for row in rows])
+            for power, words in POWERS.items():
+                with np.errstate(all="ignore"):
+                    expected = np.sign(values) * np.abs(values) ** power
+                if np.isfinite(expected).all() and np.allclose(ratios, expected, rtol=1e-6, atol=0.0):
+                    yield head + words.format(feature), on_case(name, feature, power)
+
+
+def on_case(name: str, feature: str, power: float) -> Guess:
+    """The repair that undoes a factor of the inputs."""
+
+    def repair(case: Case, got: Answer) -> Answer | None:
+        x, value = array(got.get(name)), dict(numbers_of(case)).get(feature, 0.0)
+        if x is None or value == 0.0:
+            return None
+        return {**got, name: (x / (np.sign(value) * abs(value) ** power)).tolist()}
+
+    return repair
+
+
+def numbers_of(case: Case) -> Iterator[tuple[str, float]]:
+    """Numbers that tell a case from others: counts, sizes, angles, and single numbers of its inputs."""
+    for name, value in case.inputs.items():
+        x = array(value)
+        if x is None or not np.isfinite(x).all():
+            if isinstance(value, list):
+                yield f"the number of {name}", float(len(value))
+            continue
+        if x.ndim:
+            yield f"the number of rows of {name}", float(len(x))
+        if x.ndim >= 2 and x.shape[-2:] in ((3, 3), (4, 4)):
+            yield f"the angle of {name}", _angle(x.reshape(-1, *x.shape[-2:])[0])
+        if x.ndim == 0:
+            yield f"|{name}|", abs(float(x))
+            yield name, float(x)
+        elif x.ndim == 1:
+            yield f"the length of {name}", float(np.linalg.norm(x))
+            yield from ((f"|{name}[{k}]|", abs(float(v))) for k, v in enumerate(x[:6]))
+            yield from ((f"{name}[{k}]", float(v)) for k, v in enumerate(x[:6]))
+            if x.size in (6, 7):
+                yield f"the angle of {name}", float(np.linalg.norm(x[3:6]))
+
+
+def _angle(M: Array) -> float:
+    R = M[:3, :3]
+    sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    return float(np.arctan2(np.linalg.norm(sine), (np.trace(R) - 1) / 2))
+
+
+def _order(order: tuple[int, ...]) -> str:
+    """Where the right numbers stand."""
+    return ", ".join(str(k) for k in np.argsort(order))
+
+
+KNOWN = {
+    "2": 2.0, "1/2": 0.5, "3": 3.0, "1/3": 1 / 3, "4": 4.0, "1/4": 0.25, "6": 6.0, "1/6": 1 / 6, "pi": np.pi, "-1": -1.0,
+    "180/pi": 180 / np.pi, "pi/180": np.pi / 180, "sqrt(2)": 2**0.5, "1/sqrt(2)": 0.5**0.5, "-2": -2.0, "-1/2": -0.5,
+    "ln 10": np.log(10), "1/ln 10": 1 / np.log(10), "1/ln 2": 1 / np.log(2), "1.4826": 1.482602218505602,
+    "1/1.4826": 1 / 1.482602218505602,
+}  # fmt: skip
+"""Factors that have a name."""
+
+
+def _called(factor: float) -> str:
+    return next((name for name, x in KNOWN.items() if abs(x - factor) < 1e-7 * abs(x)), f"{factor:.6g}")
+
+
+def _short(x: Array) -> str:
+    return np.array2string(x, precision=6, separator=", ", suppress_small=True).replace("\n", "")
+
+
+def places(wrong: Array) -> str:
+    """Where a mask is true, in words: an entry, a row, a column, a block, some entries."""
+    at = [tuple(int(i) for i in index) for index in np.argwhere(wrong)]
+    if wrong.ndim == 0 or wrong.all():
+        return "all entries"
+    if len(at) == 1:
+        return f"entry {_index(at[0])}"
+    low, high = np.argwhere(wrong).min(axis=0), np.argwhere(wrong).max(axis=0)
+    box = tuple(slice(int(a), int(b) + 1) for a, b in zip(low, high, strict=True))
+    if wrong[box].all():
+        if wrong.ndim == 2 and low[0] == high[0] and low[1] == 0 and high[1] == wrong.shape[1] - 1:
+            return f"row {low[0]}"
+        if wrong.ndim == 2 and low[1] == high[1] and low[0] == 0 and high[0] == wrong.shape[0] - 1:
+            return f"column {low[1]}"
+        spans = ", ".join(f"{a}-{b}" if a != b else f"{a}" for a, b in zip(low, high, strict=True))
+        return f"block ({spans})" if wrong.ndim > 1 else f"entries {spans}"
+    if len(at) <= 6:
+        return f"entries {', '.join(map(_index, at))}"
+    return f"{len(at)} of {wrong.size} entries, within {tuple(f'{a}-{b}' for a, b in zip(low, high, strict=True))}"
+
+
+def _index(at: tuple[int, ...]) -> str:
+    return str(at[0]) if len(at) == 1 else str(at)
