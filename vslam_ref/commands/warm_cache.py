@@ -12,7 +12,7 @@ HELP = "compile the accelerated kernels now and keep them on disk"
 EPILOG = "example: vslam-ref warm-cache"
 
 WITH_TWINS = (
-    *("vslam_ref.features", "vslam_ref.estimation.bundle", "vslam_ref.grids"),
+    *("vslam_ref.features", "vslam_ref.features.freak", "vslam_ref.estimation.bundle", "vslam_ref.grids"),
     *("vslam_ref.filters.ekf_slam", "vslam_ref.filters.carleman_ekf"),
     *("vslam_ref.systems.ptam", "vslam_ref.systems.orbslam", "vslam_ref.worlds.rendered"),
 )

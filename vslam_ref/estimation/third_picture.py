@@ -120,6 +120,7 @@ def ask_third(
 
     Examples
     --------
+    >>> from vslam_ref.geometry import se3
     >>> X = np.array([[x, y, 4 + 0.2 * x] for x in (-1.0, 0, 1) for y in (-1.0, 0, 1)])  # a plane
     >>> T_m, T_b = se3.exp([-0.4, 0.3, 0, 0, 0, 0]), se3.exp([-1.0, 0, 0, 0, 0.1, 0])
     >>> a, m, b = (x[:, :2] / x[:, 2:] for x in (X, se3.act(T_m, X), se3.act(T_b, X)))
