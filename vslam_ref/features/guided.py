@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vslam_ref.arrays import IntArray, as_array
-from vslam_ref.features.hamming import Matches, descriptors, differing
+from vslam_ref.features.hamming import Matches, differing, two_sets
 
 FAR = np.iinfo(np.int64).max
 
@@ -62,7 +62,7 @@ def match_near(
     >>> match_near([[10.0, 10.0]], 3.0, a, [[90.0, 10.0], [12.0, 11.0]], b)
     Matches(first=array([0]), second=array([1]), distance=array([1]))
     """
-    p, q, first, second = as_array("place", place, 2), as_array("uv", uv, 2), *_both(a, b)
+    p, q, first, second = as_array("place", place, 2), as_array("uv", uv, 2), *two_sets(a, b)
     wide = as_array("radius", radius)
     if wide.shape not in ((), (len(p),)):
         raise ValueError(f"radius is of shape {wide.shape}: need () or ({len(p)},), one for each place")
@@ -88,13 +88,6 @@ def match_near(
         alone = np.append(row, -1)[start + 1] != row[start]
         ok &= alone | (bits[start] < ratio * after)
     return Matches(row[start][ok], column[start][ok], bits[start][ok])  # eq-hamming-match
-
-
-def _both(a: ArrayLike, b: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    first, second = descriptors("a", a), descriptors("b", b)
-    if first.shape[1] != second.shape[1]:
-        raise ValueError(f"a has {first.shape[1]} bytes each and b {second.shape[1]}: need as many")
-    return first, second
 
 
 def _owner(row: IntArray, column: IntArray, bits: IntArray, count: int) -> IntArray:

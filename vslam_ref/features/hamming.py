@@ -48,7 +48,14 @@ def descriptors(name: str, given: ArrayLike) -> Bytes:
     return np.ascontiguousarray(array)
 
 
-def _both(a: ArrayLike, b: ArrayLike) -> tuple[Bytes, Bytes]:
+def two_sets(a: ArrayLike, b: ArrayLike) -> tuple[Bytes, Bytes]:
+    """Check two sets of descriptors (n, bytes) and (m, bytes), which have no unit, and lay them out in rows.
+
+    Raises
+    ------
+    ValueError
+        If they are not bytes in rows, or not as many.
+    """
     first, second = descriptors("a", a), descriptors("b", b)
     if first.shape[1] != second.shape[1]:
         raise ValueError(f"a has {first.shape[1]} bytes each and b {second.shape[1]}: need as many")
@@ -80,7 +87,7 @@ def distances(a: ArrayLike, b: ArrayLike) -> Counts:
     >>> distances(np.array([[0b1100]], np.uint8), np.array([[0b1010], [0b1100]], np.uint8))
     array([[2, 0]], dtype=int32)
     """
-    return _distances(*_both(a, b))
+    return _distances(*two_sets(a, b))
 
 
 @accelerated("hamming:distances")

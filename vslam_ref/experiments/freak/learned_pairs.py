@@ -9,7 +9,6 @@ provenance.  The same seeds give the same table, byte for byte, with and without
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import sys
 from collections.abc import Iterator
@@ -17,13 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from vslam_ref.experiments.orb.learned_table import SCENES, rendered_pictures, write_or_check
 from vslam_ref.features.freak import learning
 from vslam_ref.features.levels import Bytes
 from vslam_ref.features.orb import OrbSettings
-from vslam_ref.support.files import write_text
-from vslam_ref.worlds.rendered import scene
 
-SCENES = ("desk", "corridor", "rotation", "building")
 SCENE_SEEDS, PER_SCENE = (101, 102, 103), 4
 PER_PICTURE = OrbSettings(features=400)
 TARGET = Path(learning.__file__).with_name("pair_table.py")
@@ -32,11 +29,7 @@ COMMAND = "python -m vslam_ref.experiments.freak.learned_pairs"
 
 def pictures() -> Iterator[Bytes]:
     """Yield the rendered pictures from which is learned."""
-    for name in SCENES:
-        for seed in SCENE_SEEDS:
-            made = scene(name, seed)
-            for k in range(PER_SCENE):
-                yield made.frame(k * (len(made.times) - 1) // PER_SCENE)
+    yield from rendered_pictures(SCENE_SEEDS, PER_SCENE)
 
 
 def table() -> str:
@@ -89,17 +82,7 @@ PAIRS = np.array(_NUMBERS.split(), np.int64).reshape(512, 2)
 
 def main(arguments: list[str] | None = None) -> int:
     """Write the table, or compare it with the one that is there."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="write nothing: exit status 1 if it differs")
-    check = parser.parse_args(arguments).check
-    text = table()
-    if check:
-        same = TARGET.read_text() == text
-        print(f"{TARGET.name}: {'the same' if same else 'another table'}")
-        return 0 if same else 1
-    write_text(TARGET, text)
-    print(f"wrote {TARGET.name}")
-    return 0
+    return write_or_check(__doc__ or "", TARGET, table, arguments)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ the same table, byte for byte, with and without Numba.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import sys
 from collections.abc import Iterator
@@ -20,13 +19,11 @@ import numpy as np
 
 from vslam_ref.datasets import catalogue
 from vslam_ref.datasets.pictures import read_grey
+from vslam_ref.experiments.orb.learned_table import SCENES, rendered_pictures, write_or_check
 from vslam_ref.features.levels import Bytes
 from vslam_ref.features.orb import OrbSettings, learning
-from vslam_ref.support.files import write_text
-from vslam_ref.worlds.rendered import scene
 
 SEED, CANDIDATES = 2011, 40_000
-SCENES = ("desk", "corridor", "rotation", "building")
 SCENE_SEEDS, PER_SCENE = (101, 102), 2
 SETS = {
     "tum_fr3_office_1hz": "rgb/*.png",
@@ -40,11 +37,7 @@ COMMAND = "python -m vslam_ref.experiments.orb.learned_pairs"
 
 def pictures() -> Iterator[Bytes]:
     """Yield the pictures from which is learned, rendered ones first."""
-    for name in SCENES:
-        for seed in SCENE_SEEDS:
-            made = scene(name, seed)
-            for k in range(PER_SCENE):
-                yield made.frame(k * (len(made.times) - 1) // PER_SCENE)
+    yield from rendered_pictures(SCENE_SEEDS, PER_SCENE)
     for folder, pattern in SETS.items():
         for path in sorted(catalogue.require(folder).glob(pattern)):
             yield read_grey(path)
@@ -103,17 +96,7 @@ PAIRS = np.array(_NUMBERS.split(), np.int64).reshape(256, 4)
 
 def main(arguments: list[str] | None = None) -> int:
     """Write the table, or compare it with the one that is there."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="write nothing: exit status 1 if it differs")
-    check = parser.parse_args(arguments).check
-    text = table()
-    if check:
-        same = TARGET.read_text() == text
-        print(f"{TARGET.name}: {'the same' if same else 'another table'}")
-        return 0 if same else 1
-    write_text(TARGET, text)
-    print(f"wrote {TARGET.name}")
-    return 0
+    return write_or_check(__doc__ or "", TARGET, table, arguments)
 
 
 if __name__ == "__main__":

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.datasets.sequences import Sequence
-from vslam_ref.experiments.ptam.offset_runs import told
-from vslam_ref.experiments.ptam.recorded import RecordedSequence, open_recorded
-from vslam_ref.experiments.visual_slam import running
-from vslam_ref.support.config import replace_settings
+from vslam_ref.experiments.ptam.offset_runs import run_twice, told
+from vslam_ref.experiments.ptam.recorded import RecordedSequence
 from vslam_ref.systems.orbslam import OrbSlam, Settings
 from vslam_ref.systems.orbslam.feature_map import FeatureMap
 
@@ -74,13 +69,7 @@ def run_offset(
         At most; by default all.
     settings : Settings, optional
     """
-    s, sequence = settings or Settings(), open_recorded(each, offset, pictures)
-
-    def stop(done: running.Run) -> bool:
-        return done.system.map is None and len(done.frames) >= each.start_within
-
-    done = running.run(sequence, s, stop)
-    second = None if each.most_refined is None or done.system.map is None else _refined(sequence, s, stop)
+    done, second = run_twice(each, offset, pictures, settings or Settings())
     assert isinstance(done.system, OrbSlam)
     counts, pairs = done.system.counts(), revisits(each, done.system)
     return OrbOffsetRun(
@@ -95,17 +84,6 @@ def run_offset(
 
 def _used(feature_map: FeatureMap | None) -> int:
     return 0 if feature_map is None else len(feature_map.used_keyframes())
-
-
-def _refined(
-    sequence: Sequence, settings: Settings, stop: Callable[[running.Run], bool]
-) -> running.Run | None:
-    """A second run, with the camera that a first one has refined."""
-    first = running.run(sequence, replace_settings(settings, {"camera.refine": True}), stop)
-    refined = first.system.refined
-    if refined is None:
-        return None
-    return running.run(replace(sequence, camera=refined.camera), settings, stop)
 
 
 def revisits(each: RecordedSequence, system: OrbSlam) -> list[tuple[int, int]]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vslam_ref.arrays import Array, BoolArray, IntArray
-from vslam_ref.experiments.ptam.recorded import RecordedSequence, second_path
+from vslam_ref.experiments.ptam.recorded import RecordedSequence, open_recorded, second_path
 from vslam_ref.experiments.visual_slam import numbers, running
+from vslam_ref.support.config import replace_settings
 
 REASON_LENGTH = 200
 
@@ -57,6 +58,28 @@ class OffsetRun(NamedTuple):
     keyframes: IntArray
     points: IntArray
     reason: NDArray[np.str_]
+
+
+def run_twice(
+    each: RecordedSequence, offset: int, pictures: int | None, settings: Any
+) -> tuple[running.Run, running.Run | None]:
+    """Run a system from one picture to the end; where the table asks for it, with a refined camera, too.
+
+    ``settings`` decide which system runs.  The second run takes the camera that another one has refined; it
+    is None where none was asked for, or where the camera could not be refined.
+    """
+    sequence = open_recorded(each, offset, pictures)
+
+    def stop(done: running.Run) -> bool:
+        return done.system.map is None and len(done.frames) >= each.start_within
+
+    done = running.run(sequence, settings, stop)
+    if each.most_refined is None or done.system.map is None:
+        return done, None
+    refined = running.run(sequence, replace_settings(settings, {"camera.refine": True}), stop).system.refined
+    if refined is None:
+        return done, None
+    return done, running.run(replace(sequence, camera=refined.camera), settings, stop)
 
 
 def told(

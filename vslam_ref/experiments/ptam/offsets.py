@@ -19,10 +19,9 @@ import numpy as np
 
 from vslam_ref.experiments.framework import Experiment, Study
 from vslam_ref.experiments.ptam.offset_claims import claims, counted
-from vslam_ref.experiments.ptam.offset_runs import OffsetRun, told
-from vslam_ref.experiments.ptam.recorded import RecordedSequence, found, open_recorded, recorded
-from vslam_ref.experiments.visual_slam import running
-from vslam_ref.support.config import assume, replace_settings
+from vslam_ref.experiments.ptam.offset_runs import OffsetRun, run_twice, told
+from vslam_ref.experiments.ptam.recorded import RecordedSequence, found, recorded
+from vslam_ref.support.config import assume
 from vslam_ref.systems.ptam.presets import PRESETS, preset
 from vslam_ref.systems.ptam.settings import Settings
 
@@ -73,21 +72,8 @@ def offsets(config: OffsetsConfig, name: str) -> Sequence[int]:
 def simulate(config: OffsetsConfig, name: str, offset: int) -> OffsetRun:
     """Run PTAM from one offset to the end."""
     each = recorded()[name]
-    sequence = open_recorded(each, offset, config.pictures or None)
-
-    def stop(done: running.Run) -> bool:
-        return done.system.map is None and len(done.frames) >= each.start_within
-
     settings = preset(config.preset) if config.preset else Settings()
-    settings = replace(settings, seed=config.seed)
-    done = running.run(sequence, settings, stop)
-    if each.most_refined is None:
-        return told(each, offset, done)
-    first = running.run(sequence, replace_settings(settings, {"camera.refine": True}), stop)
-    refined = first.system.refined
-    if refined is None:
-        return told(each, offset, done)
-    second = running.run(replace(sequence, camera=refined.camera), settings, stop)
+    done, second = run_twice(each, offset, config.pictures or None, replace(settings, seed=config.seed))
     return told(each, offset, done, second)
 
 

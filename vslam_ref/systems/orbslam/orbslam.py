@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.features.vocabulary import Vocabulary
 from vslam_ref.support.stopwatch import stage
 from vslam_ref.systems.orbslam import start as start_steps
@@ -33,7 +33,7 @@ from vslam_ref.systems.orbslam.start import StartMatches
 from vslam_ref.systems.orbslam.start_steps import MatchingSteps
 from vslam_ref.systems.orbslam.tracker.tracker import FeatureTracker, TrackedFeatures
 from vslam_ref.systems.visual_map.refine_camera import refine_camera
-from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, Quality, Trail
+from vslam_ref.systems.visual_map.telling import FIRST, Attempt, PictureOutcome, Trail
 from vslam_ref.systems.visual_map.visual_slam import VisualSlam
 
 LOOP_SEED = 1
@@ -126,17 +126,9 @@ class OrbSlam(VisualSlam[DescribedPicture, FeatureMap, StartMatches, FeatureTrac
         tracked = tracker.track(known, picture)
         return tracked, tracker.reference
 
-    def _with_the_map(self, known: FeatureMap, picture: DescribedPicture) -> PictureOutcome:
-        assert self.tracker is not None
-        tracked, kf = self._track(self.tracker, known, picture)
-        mapped = None
-        if tracked.quality is not Quality.LOST:
-            known.points["tried"][tracked.found.tried] += 1
-            known.points["found"][tracked.point] += 1
-            self._note(known, picture, tracked, kf, live=True)
-            if self.policy.wants(known, tracked):
-                mapped = self._keyframe(known, self.tracker, picture, tracked)
-        return PictureOutcome(picture.number, tracked, mapped)
+    def _count(self, tried: IntArray, found: IntArray, tracked: TrackedFeatures) -> None:
+        tried[tracked.found.tried] += 1
+        found[tracked.point] += 1
 
     def _keyframe(
         self,
@@ -178,11 +170,7 @@ class OrbSlam(VisualSlam[DescribedPicture, FeatureMap, StartMatches, FeatureTrac
         loops = self.close_loops.counts() if self.close_loops else NO_LOOPS
         return {**loops, "culled_keyframes": culled}
 
-    def trail(self) -> Trail | None:
-        """Features that are followed before there is a map; None without any."""
-        matched = self.followed
-        if matched is None or (self.chosen is None and len(matched.pictures) < 2):
-            return None
-        rows = matched.rows
-        level = matched.pictures[0].features.octave[rows]
-        return Trail(matched.places[-1, rows], level, matched.places[0, rows])
+    def _trail(self, followed: StartMatches) -> Trail:
+        rows = followed.rows
+        level = followed.pictures[0].features.octave[rows]
+        return Trail(followed.places[-1, rows], level, followed.places[0, rows])

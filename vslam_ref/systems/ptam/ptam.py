@@ -130,19 +130,7 @@ class Ptam(VisualSlam[PreparedPicture, VisualMap, Trails, Tracker]):
         lost = tracked.quality is Quality.LOST
         return tracked, 0 if lost else nearest_keyframe(known.T_kf_world, tracked.T_cam_world)
 
-    def _with_the_map(self, known: VisualMap, picture: PreparedPicture) -> PictureOutcome:
-        assert self.tracker is not None
-        tracked, kf = self._track(self.tracker, known, picture)
-        mapped = None
-        if tracked.quality is not Quality.LOST:
-            self._count(known.points["tried"], known.points["found"], tracked)
-            self._note(known, picture, tracked, kf, live=True)
-            if self.policy.wants(known, tracked):
-                mapped = self._keyframe(known, self.tracker, picture, tracked)
-        return PictureOutcome(picture.number, tracked, mapped)
-
     def _count(self, tried: IntArray, found: IntArray, tracked: Tracked) -> None:
-        """Count for each point (N,) that it was looked for, and whether it was found."""
         seen = tracked.fine.seen.point
         tried[seen] += 1
         found[seen[tracked.fine.weights > 0]] += 1
@@ -164,9 +152,5 @@ class Ptam(VisualSlam[PreparedPicture, VisualMap, Trails, Tracker]):
         if self.settings.camera.refine:
             self.refined = refine_camera(made, robust(self.settings), self.settings.camera)
 
-    def trail(self) -> Trail | None:
-        """Points that are followed before there is a map; None without any."""
-        trails = self.followed
-        if trails is None or (self.chosen is None and len(trails.pictures) < 2):
-            return None
-        return Trail(trails.now, trails.level, trails.first)
+    def _trail(self, followed: Trails) -> Trail:
+        return Trail(followed.now, followed.level, followed.first)

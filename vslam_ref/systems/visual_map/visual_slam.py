@@ -11,13 +11,13 @@ A pose is kept relative to its reference keyframe, so that it moves with it; wha
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vslam_ref.arrays import Array
+from vslam_ref.arrays import Array, IntArray
 from vslam_ref.geometry import se3
 from vslam_ref.geometry.cameras import Camera
 from vslam_ref.support.stopwatch import Stopwatch, stage
@@ -30,6 +30,7 @@ from vslam_ref.systems.visual_map.telling import (
     Pose,
     Quality,
     TrackedPicture,
+    Trail,
     path_of,
 )
 
@@ -48,6 +49,16 @@ class FollowedPictures(Protocol):
     @property
     def pictures(self) -> Any:
         """Prepared, from the first one on."""
+
+
+class KeyframeChoice(Protocol):
+    """When a tracked picture becomes a keyframe."""
+
+    def wants(self, known: Any, tracked: Any) -> bool:
+        """Whether this picture shall be one; called once for each."""
+
+    def taken(self) -> None:
+        """Begin anew: it became one."""
 
 
 PictureT = TypeVar("PictureT", bound=Numbered)
@@ -75,6 +86,8 @@ class VisualSlam(ABC, Generic[PictureT, MapT, FollowedT, TrackerT]):
     followed : FollowedT or None
         What is followed before there is a map.
     tracker : TrackerT or None
+    policy : KeyframeChoice
+        Which tracked pictures become keyframes; each system sets its own.
     poses : dict of int to Pose
         By the number of the picture.
     started_at : tuple of two ints, or None
@@ -88,6 +101,7 @@ class VisualSlam(ABC, Generic[PictureT, MapT, FollowedT, TrackerT]):
     camera: Camera
     settings: Any
     chosen: ChosenStart | None = None
+    policy: KeyframeChoice = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.settings.seed)
@@ -157,8 +171,16 @@ class VisualSlam(ABC, Generic[PictureT, MapT, FollowedT, TrackerT]):
         """A tracked picture, and the keyframe to which its pose is kept; any where it is lost."""
 
     @abstractmethod
-    def _with_the_map(self, known: MapT, picture: PictureT) -> PictureOutcome:
-        """Track a picture, and take it into the map if it is wanted."""
+    def _count(self, tried: IntArray, found: IntArray, tracked: Any) -> None:
+        """Count for each point (N,) that it was looked for, and whether it was found."""
+
+    @abstractmethod
+    def _keyframe(self, known: MapT, tracker: TrackerT, picture: PictureT, tracked: Any) -> Any:
+        """Take a tracked picture into the map; return what the mapper says."""
+
+    @abstractmethod
+    def _trail(self, followed: FollowedT) -> Trail:
+        """What is followed, to be drawn."""
 
     # --- before there is a map ------------------------------------------------------------------
 
@@ -169,6 +191,13 @@ class VisualSlam(ABC, Generic[PictureT, MapT, FollowedT, TrackerT]):
         if told.attempt is not None and not told.reason:
             self._start(told.attempt)
         return PictureOutcome(picture.number, attempt=told.attempt or told.reason or None)
+
+    def trail(self) -> Trail | None:
+        """What is followed before there is a map; None without any."""
+        followed = self.followed
+        if followed is None or (self.chosen is None and len(followed.pictures) < 2):
+            return None
+        return self._trail(followed)
 
     def _start(self, found: Attempt) -> None:
         """Make the first map, and track the pictures between against it."""
@@ -187,6 +216,18 @@ class VisualSlam(ABC, Generic[PictureT, MapT, FollowedT, TrackerT]):
         self.followed = None
 
     # --- with a map -----------------------------------------------------------------------------
+
+    def _with_the_map(self, known: MapT, picture: PictureT) -> PictureOutcome:
+        """Track a picture, and take it into the map if it is wanted."""
+        assert self.tracker is not None
+        tracked, kf = self._track(self.tracker, known, picture)
+        mapped = None
+        if tracked.quality is not Quality.LOST:
+            self._count(known.points["tried"], known.points["found"], tracked)
+            self._note(known, picture, tracked, kf, live=True)
+            if self.policy.wants(known, tracked):
+                mapped = self._keyframe(known, self.tracker, picture, tracked)
+        return PictureOutcome(picture.number, tracked, mapped)
 
     def _note(self, known: MapT, picture: PictureT, tracked: TrackedPicture, kf: int, *, live: bool) -> None:
         """Remember a pose relative to its reference keyframe."""
